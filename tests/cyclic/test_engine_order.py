@@ -14,7 +14,8 @@ from tolerances import REPEATED, ROUNDING, SOLVED
 from fretwave.case.load import load_case
 from fretwave.cyclic.engine_order import folded, speed_rpm
 from fretwave.errors import CaseErrors
-from fretwave.post.blade_peaks import blade_tables, whitehead
+from fretwave.post.blade_peaks import beyond, blade_tables, whitehead
+from fretwave.results.sweep_summary import _forced_words
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import run_case
 
@@ -208,6 +209,23 @@ def test_peaks_of_blades_take_each_at_its_own_frequency():
     assert each["amplification"][:2] == pytest.approx([1.0, 3.0]) and np.isnan(each["amplitude"][2])
     assert each["frequency_hz"][:2] == pytest.approx(np.array([3.0, 2.0]) / (2 * np.pi))
     assert whitehead(36) == 3.5
+    assert beyond({"level": np.ones(301)}, blades, each) == {}, "0.04 at the end, less than the peaks"
+
+
+@pytest.mark.ranks(1)
+def test_a_blade_that_moves_more_where_the_range_ends_is_told():
+    """Of level 1 a blade rises to 5 at the end, beside a peak of 3; of level 2 no blade has a peak."""
+    omega = np.linspace(1, 4, 301)
+    peak = 3.0 / np.sqrt(1 + 400 * (omega - 2.0) ** 2)
+    blades = np.vstack([np.column_stack([peak, 1.25 * omega]), np.column_stack([omega, 2.0 * omega])])
+    table = {"level": np.repeat([1.0, 2.0], 301), "omega": np.tile(omega, 2)}
+    tuned = {"level": table["level"], "frequency_hz": table["omega"], "amplitude": np.tile(peak, 2)}
+    peaks, each = blade_tables(table, blades, tuned)
+    assert peaks["sector"].tolist() == [0, -1] and np.isnan(peaks["amplitude"][1])
+    assert beyond(table, blades, each) == {1.0: (1, pytest.approx(5.0)), 2.0: (1, pytest.approx(8.0))}
+    none = dict(largest_blade_amplitude=np.nan, largest_blade_frequency_hz=np.nan, largest_blade=-1.0)
+    row = {"largest_amplitude": 4.0, "frequency_of_largest_amplitude": 0.5, "unit": "m", **none}
+    assert _forced_words(row) == "largest 4 m at 0.5 Hz", "no sector and no nan"
 
 
 #: (text in the case, its replacement, what is said)

@@ -16,6 +16,8 @@ def blade_tables(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """``<name>_peaks.csv``, a row for each level, and ``<name>_blades.csv``, one for each level and sector.
 
+    Where no blade has a peak within the frequency range the sector is -1.
+
     Parameters
     ----------
     table : columns level and omega, (points,)
@@ -33,7 +35,7 @@ def blade_tables(
         "level": levels,
         "frequency_hz": frequency[rows, most],
         "amplitude": amplitude[rows, most],
-        "sector": most,
+        "sector": np.where(np.isnan(amplitude).all(axis=1), -1, most),
         "tuned_frequency_hz": np.array([peak.omega for peak in before]) / (2 * np.pi),
         "tuned_amplitude": tuned_amplitude,
         "amplification": amplitude[rows, most] / tuned_amplitude,
@@ -46,6 +48,22 @@ def blade_tables(
         "amplitude": amplitude.ravel(),
         "amplification": (amplitude / tuned_amplitude[:, None]).ravel(),
     }
+
+
+def beyond(table: Mapping[str, Array], blades: Array, each: Mapping[str, Array]) -> dict[float, tuple[int, float]]:
+    """Levels at which a blade without a peak moves more at an end of the range than all peaks: it and how far.
+
+    Parameters
+    ----------
+    each : the second table of `blade_tables`
+    """
+    found = {}
+    for level in np.unique(table["level"]):
+        peaks, moved = each["amplitude"][each["level"] == level], blades[table["level"] == level].max(axis=0)
+        at_ends = np.where(np.isnan(peaks), moved, -np.inf)
+        if at_ends.max() > np.nanmax(peaks, initial=0.0):
+            found[float(level)] = (largest(at_ends), float(at_ends.max()))
+    return found
 
 
 def _peak(table: Mapping[str, Array], level: float, omega: Array, amplitude: Array) -> Peak:

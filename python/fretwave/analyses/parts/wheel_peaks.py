@@ -14,7 +14,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...case.observed import dof_of
-from ...post.blade_peaks import blade_tables, whitehead
+from ...post.blade_peaks import beyond, blade_tables, whitehead
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import Peak, distance
 from ...results.results import AnalysisWriter
@@ -48,7 +48,16 @@ def blade_by_blade(
     context.entry["peaks"] = rows
     bound = whitehead(context.case.wheel.sectors) if context.case.wheel else np.nan
     unit = context.units("length")
-    return [f"{context.name}: {_line(row, unit)} (Whitehead's bound {bound:.3f})" for row in rows]
+    more = beyond(table, amplitudes, blades)
+    ends = [_at_an_end(more.get(row["level"]), unit) for row in rows]
+    return [f"{context.name}: {_line(row, unit)} (Whitehead's bound {bound:.3f}){end}" for row, end in zip(rows, ends)]
+
+
+def _at_an_end(found: Optional[tuple[int, float]], unit: str) -> str:
+    """Of a blade that moves more than all peaks where the frequency range ends."""
+    if found is None:
+        return ""
+    return f"; but sector {found[0]} moves {found[1]:.4g} {unit} at an end of the frequency range: its peak is beyond"
 
 
 def _line(row: Mapping[str, float], unit: str) -> str:
