@@ -87,12 +87,29 @@ def unread(*words: object) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize(
-    "words", ("--version", "doctor", "check CASE", "check --keys", "run CASE --quick --only mode --out OUT")
+    "words",
+    (
+        "--version",
+        "doctor",
+        "doctor --constants",
+        "check CASE",
+        "check --keys",
+        "check --schema",
+        "check --schema CASE",
+        "run CASE --quick --only mode --out OUT",
+    ),
 )
 def test_output_that_nobody_reads_ends_without_a_word(tmp_path: Path, words: str) -> None:
-    """What Python had kept to print at its end made exit code 120 and "Exception ignored"."""
+    """What Python had kept to print at its end made exit code 120 and "Exception ignored"; PETSc reported a fault."""
     given = words.replace("CASE", str(CASE)).replace("OUT", str(tmp_path / "run"))
     assert unread(*given.split()) == (UNREAD, "")
+
+
+def test_so_does_one_whose_plug_in_brings_petsc(tmp_path: Path) -> None:
+    law = Path(__file__).parents[1] / "models" / "toy_law.py"
+    (tmp_path / "plug.py").write_text(law.read_text() + "\nimport petsc4py.PETSc\n")
+    (tmp_path / "case.toml").write_text(f'plugins = ["plug.py"]\n{CASE.read_text()}')
+    assert unread("check", "--keys", tmp_path / "case.toml") == (UNREAD, "")
 
 
 @pytest.mark.parametrize("command", ("show", "probe --csv --dof m1", "plot", "report"))

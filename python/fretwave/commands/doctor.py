@@ -243,7 +243,12 @@ def guarded(name: str, find: Callable[[], list[Check]]) -> list[Check]:
         first = (str(error).strip().splitlines() or [""])[0]
         return [Check(name, False, f"{type(error).__name__}: {first}", "installed and importable", ".ci/setup")]
     finally:
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc, once imported, takes it for a fault (`doctor | head`)
+        pipes_break_in_python()
+
+
+def pipes_break_in_python() -> None:
+    """PETSc, once imported, takes a reader who has left for a fault (`python doctor.py | head`)."""
+    signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def find_numpy() -> list[Check]:
@@ -347,6 +352,7 @@ def tuned_constants() -> str:
     """A line each: option of PETSc, value without it, meaning."""
     from fretwave import _core
 
+    pipes_break_in_python()
     rows = [(f"-{option}", f"{value:g}", meaning) for option, value, meaning in _core.tuned_constants()]
     widths = [max(map(len, column)) for column in zip(*rows)]
     return "\n".join(f"{a:<{widths[0]}}  {b:>{widths[1]}}  {c}" for a, b, c in rows)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +33,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     install()
     _leave_networks_alone()
-    return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else list(arguments)))
+    with _pipes_break_in_python():
+        return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+@contextmanager
+def _pipes_break_in_python() -> Iterator[None]:
+    """PETSc, whoever imports it, takes a reader who has left for a fault; kept from it, Python raises an error."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # forgets one that waits
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _dispatch(arguments: list[str]) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from typing import Any
 
@@ -19,7 +18,6 @@ def world() -> Any:
     check_runtime()
     from .. import _core  # noqa: F401
 
-    signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc takes it for a fault; Python then raises BrokenPipeError
     return MPI.COMM_WORLD
 
 
