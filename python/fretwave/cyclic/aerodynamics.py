@@ -35,7 +35,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..model.sectors import Term, by_sector, real_csr
+from ..given import numbers
+from ..model.sectors import Term, by_sector, check_number, real_csr
 from ..model.wheel_matrix import Matrix, as_matrix
 from .engine_order import folded
 
@@ -67,8 +68,10 @@ class Aerodynamics:
     dof: Optional[int] = None
 
     def __post_init__(self) -> None:
-        if not self.omega > 0:
+        if not 0 < self.omega < math.inf:
             raise InputError("influence coefficients need a frequency", None, self.omega, "> 0 rad/s", "give omega")
+        for k, L in self.influence.items():
+            numbers(f"influence coefficient {k}", [L.real, L.imag], (2,))
 
     def __repr__(self) -> str:
         acts = "modal" if self.dof is None else f"on dof {self.dof}"
@@ -80,9 +83,10 @@ class Aerodynamics:
 
         A modal viscous damper: L(theta) = -2 i zeta omega^2. Nodal diameters that are not named have none.
         """
+        check_number(sectors)
         wave = np.zeros(sectors, dtype=complex)
         for nodal_diameter, ratio in ratios.items():
-            wave[nodal_diameter % sectors] = -2j * ratio * omega**2
+            wave[nodal_diameter % sectors] = -2j * float(numbers("damping ratio", ratio)) * omega**2
         parts = np.fft.ifft(wave)  # 1/N sum_d L(theta_d) e^{+2 pi i k d / N}
         largest = np.abs(parts).max()
         kept = [k for k in range(sectors) if abs(parts[k]) > NOTHING * largest]

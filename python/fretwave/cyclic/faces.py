@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Indices
 from ..errors import InputError
-from ..model.sectors import rotation
+from ..given import place
+from ..model.sectors import check_number, rotation
 
 #: Distance of matching nodes, as a share of the faces' extent.
 TOLERANCE = 1e-6
@@ -60,9 +61,12 @@ def match_faces(
     ------
     InputError
         With the nodes that have no partner, and what would match: the faces swapped, another number of sectors or
-        axis; or for nodes on the axis, which both faces share.
+        axis; or for nodes on the axis, which both faces share, and such as are not there.
     """
     points, low, high = np.asarray(xyz, dtype=float), np.asarray(low, dtype=np.intp), np.asarray(high, dtype=np.intp)
+    check_number(sectors)
+    for node in (nodes[np.argmax(np.abs(nodes - len(points) / 2))] for nodes in (low, high) if len(nodes)):
+        place("node", node, len(points))
     called = np.arange(len(points)) if numbers is None else np.asarray(numbers)
     _check_given(points, low, high, axis, called)
     extent = float(np.ptp(points[np.concatenate([low, high])], axis=0).max())

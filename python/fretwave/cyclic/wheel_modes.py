@@ -13,13 +13,18 @@ from typing import Optional
 import numpy as np
 
 from ..arrays import Array, Complex
+from ..errors import InputError
+from ..given import not_negative, place
 from ..model.modes import LinearMode
+from ..model.sectors import check_number
 from ..model.wheel_matrix import Matrix, WheelMatrix
 from ..post.largest import largest
 from .sector import Sector, wave_mode
 
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
 ALIKE = 1e-3
+#: Of the generator.
+MOST_SEEDS = 2**63
 
 
 def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tuple[LinearMode, Optional[Complex]]:
@@ -35,6 +40,7 @@ def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tupl
     LinearMode, (N n_dof,) complex or None
         None where the wave is no double mode (0 and N/2 nodal diameters).
     """
+    check_number(sectors)
     phi = wave_mode(mode, nodal_diameter, sectors)
     return phi, None if _single(nodal_diameter, sectors) else phi.shape - 1j * phi.imaginary
 
@@ -52,12 +58,21 @@ def standing_wave(
         Of a sector.
     crest : int
         The sector.
+
+    Raises
+    ------
+    InputError
+        There is no such dof or sector, or the dof does not move.
     """
+    check_number(sectors)
+    dof, crest = place("dof", dof, len(mode.shape)), place("sector", crest, sectors)
     wave = wave_mode(mode, nodal_diameter, sectors)
     if _single(nodal_diameter, sectors):
         return wave, None
     phi = wave.shape + 1j * wave.imaginary
     there = phi[crest * len(mode.shape) + dof]
+    if not there:
+        raise InputError("the dof has no crest", f"dof {dof}", 0.0, "a motion in this wave", "choose one that moves")
     phi *= np.sqrt(2) * abs(there) / there  # real where its crest shall be
     return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
 
@@ -81,7 +96,14 @@ def deviations(sectors: int, standard_deviation: float, seed: int = 1) -> Array:
     """Relative deviations (N,) of the sectors: normally distributed (PCG64), less their mean.
 
     Without its mean a pattern leaves the family's mean frequency, to first order, where it was.
+
+    Raises
+    ------
+    InputError
+        Fewer than two sectors, a negative standard deviation or seed.
     """
+    check_number(sectors)
+    standard_deviation, seed = not_negative("standard_deviation", standard_deviation), place("seed", seed, MOST_SEEDS)
     drawn = np.random.Generator(np.random.PCG64(seed)).standard_normal(sectors)
     return np.asarray(standard_deviation * (drawn - drawn.mean()))
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from typing import SupportsIndex
 
 from .. import _core
 from ..errors import InputError
+from ..given import whole
 from ..model.model import Model
 from .states import default_samples
 
@@ -81,8 +81,8 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
 
 
 def _whole(name: str, value: SupportsIndex) -> int:
-    try:
-        return operator.index(value)
-    except TypeError:
+    number = whole(value)
+    if number is None:
         fix = "give one number, as in choose_harmonics(model, 7, samples=128)"
-        raise InputError("harmonics and samples are whole numbers", name, repr(value), "an int", fix) from None
+        raise InputError("harmonics and samples are whole numbers", name, repr(value), "an int", fix)
+    return number

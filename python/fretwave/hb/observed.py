@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from typing import SupportsIndex, Union, cast
 
@@ -11,6 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..columns import MODAL_UNIT
 from ..errors import InputError
+from ..given import whole
 from ..model.model import Model
 from ..model.modes import LinearMode
 
@@ -44,11 +44,8 @@ def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
 
 
 def _dof(model: Model, given: SupportsIndex) -> int:
-    try:
-        dof = operator.index(given)
-    except TypeError:
-        dof = -1
-    if not 0 <= dof < model.n_dof:
+    dof = whole(given)
+    if dof is None or not 0 <= dof < model.n_dof:
         measured, expected = repr(given), f"0 to {model.n_dof - 1}"
         raise InputError("the chosen dof does not exist", None, measured, expected, "choose a dof of the model")
     return dof

@@ -22,9 +22,10 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Complex
 from ..errors import InputError
+from ..given import not_negative
 from ..texts import counted
 from .contact import Contact
-from .sectors import Term, by_sector, real_csr
+from .sectors import Term, by_sector, check_number, real_csr
 
 #: A damping ratio of all modes, of the lowest, or by the number of the mode (1 is the lowest).
 Ratios = Union[float, Sequence[float], Mapping[int, float]]
@@ -60,8 +61,11 @@ def modal_damping(
     Raises
     ------
     InputError
-        More dofs than full matrices are made of, a mode that is not there, two ratios of modes of one frequency.
+        More dofs than full matrices are made of, a mode that is not there, two ratios of modes of one frequency, a
+        ratio that is negative or no number.
     """
+    if sectors:
+        check_number(sectors)
     n = int(np.shape(by_sector(M)[0])[0])
     check_size(n, sectors)
     waves = range(sectors // 2 + 1) if sectors else range(1)
@@ -138,17 +142,17 @@ def _of_modes(ratios: Ratios, omega: Array, where: str | None) -> Array:
     """Damping ratio of every mode."""
     if isinstance(ratios, Mapping):
         given = dict(ratios)
-    elif isinstance(ratios, Sequence):
-        given = dict(enumerate(ratios, 1))
+    elif np.ndim(ratios):
+        given = dict(enumerate(np.asarray(ratios).tolist(), 1))
     else:
-        return np.full(len(omega), float(ratios))
+        return np.full(len(omega), not_negative("damping ratio", ratios))
     zeta = np.zeros(len(omega))
     for number, ratio in given.items():
         if not 1 <= number <= len(omega):
             fix = "leave it out, or keep more component modes"
             what = "a damping ratio is of a mode that is not there"
             raise InputError(what, where, f"mode {number}", f"1 to {counted(len(omega), 'mode')}", fix)
-        zeta[number - 1] = ratio
+        zeta[number - 1] = not_negative(f"damping ratio of mode {number}", ratio)
     _check_apart(zeta, omega, where)
     return zeta
 

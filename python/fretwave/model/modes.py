@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from dataclasses import dataclass
 from typing import SupportsIndex
 
@@ -15,6 +14,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError, PetscError
 from ..files.memory import machine_memory, size
+from ..given import whole
 from ..mpi.gather import on_all_ranks
 from ..mpi.guard import all_ranks_failed
 from .checks import DENSE_LIMIT, check_mass
@@ -86,7 +86,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     """
     if contact not in ("stuck", "free", "linearised"):
         raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
-    if near is not None and (contact == "linearised" or not near > 0):
+    if near is not None and (contact == "linearised" or not 0 < near < np.inf):
         given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
     count = _number(count)
@@ -111,11 +111,8 @@ MOST_MODES = 2**31 - 1
 
 
 def _number(count: SupportsIndex) -> int:
-    try:
-        number = operator.index(count)
-    except TypeError:
-        number = 0
-    if not 1 <= number <= MOST_MODES:
+    number = whole(count)
+    if number is None or not 1 <= number <= MOST_MODES:
         expected = f"1 to {MOST_MODES}"
         raise InputError("modes are asked for by their number", "count", repr(count), expected, "give a number")
     return number

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..errors import InputError
+from ..given import whole
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -125,7 +126,7 @@ def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, Sp
 
 def check_number(sectors: int) -> None:
     """A wheel has neighbours."""
-    if sectors < 2:
+    if (whole(sectors) or 0) < 2:
         raise InputError("a wheel has two sectors or more", None, sectors, ">= 2", "give their number")
 
 

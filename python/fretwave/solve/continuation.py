@@ -33,7 +33,7 @@ class Point:
     Attributes
     ----------
     parameter : amplitude (modes) or omega (forced response)
-    event : "", start, stop, report, fold, zero_damping or peak_damping
+    event : "", start, stop, report, fold, zero_damping or peak_damping of a mode, peak of a response
     step : arclength from the last regular point
     wall_s : seconds since the point before
     rounding : error of the residual that rounding leaves, expected

@@ -21,6 +21,9 @@ from .table import Table
 from .trace import Knot, Trace, cubic_of
 from .unknowns import Unknowns
 
+#: Relative: a start so near to an end of its range lies on it.
+AT_AN_END = 1e-9
+
 
 def follow(
     problem: HarmonicProblem,
@@ -73,7 +76,7 @@ def follow(
     Raises
     ------
     InputError
-        The range is empty, or the problem is none of these.
+        The range is empty, the start is not in it, or the problem is none of these.
 
     Examples
     --------
@@ -91,8 +94,8 @@ def follow(
     >>> branch.events[-1]
     Event(name='stop', row=...)
     """
-    if problem.meaning is None:
-        given, fix = type(problem).__name__, "follow it with fw.Continuation"
+    if not isinstance(problem, HarmonicProblem) or problem.meaning is None:
+        given, fix = type(problem).__name__, "give one of these; fw.Continuation follows others"
         raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
     if accuracy is not None and not 0 < accuracy < 1:
         fix = "give for example accuracy=1e-3"
@@ -170,8 +173,14 @@ def _free(point: Point | None) -> None:
 
 def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, float, bool | None]:
     """Ends of the range, and whether the parameter grows at first (None: away from the nearer end)."""
-    if np.ndim(stop):
-        low, high = (float(value) for value in np.asarray(stop))
-        return low, high, None
-    end = float(np.asarray(stop))
-    return min(first, end), max(first, end), end > first
+    ends = np.asarray(stop, dtype=float)
+    if ends.shape not in ((), (2,)) or not (ends >= 0).all():
+        expected, fix = "a number >= 0, or two: (low, high)", "say where the branch shall end"
+        raise InputError("a branch cannot end there", "stop", repr(stop), expected, fix)
+    if not ends.shape:
+        return min(first, float(ends)), max(first, float(ends)), float(ends) > first
+    low, high = ends.tolist()
+    if low < high and not low * (1 - AT_AN_END) <= first <= high * (1 + AT_AN_END):
+        fix = "start within it, or give the end alone: stop=high"
+        raise InputError("the branch begins outside its range", None, first, f"{low:g} to {high:g}", fix)
+    return low, high, None

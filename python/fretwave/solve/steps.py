@@ -5,11 +5,11 @@ Their defaults stand here alone; case files take them from here.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..given import positive, whole
 
 if TYPE_CHECKING:
     from .. import _core
@@ -46,8 +46,8 @@ class StepControl:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            _positive("step", name, value)
-        if self.max_points < 2:
+            positive(f"step.{name}", value)
+        if (whole(self.max_points) or 0) < 2:
             raise InputError("a branch needs two points", "step.max_points", self.max_points, ">= 2", "allow more")
 
     def core(self) -> _core.StepControl:
@@ -79,7 +79,7 @@ class WearControl:
     Raises
     ------
     InputError
-        A value is not a positive number.
+        A value is not a positive number, or there is no such stepper.
     """
 
     stepper: str = "bogacki_shampine"
@@ -89,14 +89,11 @@ class WearControl:
     fixed: bool = False
 
     def __post_init__(self) -> None:
-        _positive("wear", "tolerance", self.tolerance)
-        _positive("wear", "pressure_change", self.pressure_change)
+        from .steppers import STEPPERS
+
+        positive("wear.tolerance", self.tolerance)
+        positive("wear.pressure_change", self.pressure_change)
         if self.first is not None:
-            _positive("wear", "first", self.first)
-
-
-def _positive(section: str, name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise InputError(
-            "the step control cannot be used", f"{section}.{name}", value, "a number > 0", "give a positive number"
-        )
+            positive("wear.first", self.first)
+        if self.stepper not in STEPPERS:
+            raise InputError("unknown stepper", None, self.stepper, ", ".join(STEPPERS), "choose one of these")

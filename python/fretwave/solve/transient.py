@@ -11,6 +11,7 @@ import numpy.typing as npt
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..given import numbers, positive
 from ..model.model import Model
 from ..mpi.gather import on_all_ranks
 from .steps import TIME_TOLERANCE
@@ -88,7 +89,17 @@ class Transient:
         dict
             t (n,), x and v (n, n_dof) every `dt_out`; steps; implicit; finished (reached the end); reason ("end",
             "limit" of the motion, too many "steps", or why the method stopped). On every rank.
+
+        Raises
+        ------
+        InputError
+            An array does not fit the model, or a number is not above zero.
         """
+        for name, value in (("rtol", rtol), ("most_steps", most_steps)):
+            positive(name, value)
+        numbers("t_end, dt_out", [t_end, dt_out], (2,))
+        if not limit > 0:
+            raise InputError("a motion cannot be so small", "limit", limit, "> 0", "give a larger limit, or none")
         t, x, v, steps, implicit, finished, reason = self._core.run(
             self.model.vector(x0), self.model.vector(v0), t_end, dt_out, rtol, limit, float(most_steps)
         )

@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..arrays import Array
-from ..errors import InputError
+from ..given import positive
 from .steppers import STEPPERS, StageDiverged, StageFailed, take
 from .steps import TOO_FAST, WearControl
 from .worn_mode import WornMode, WornState
@@ -81,9 +81,7 @@ class Wear:
         outcome: tuple[int, int, float] = (0, 0, 0.0),
         growth: Array | None = None,
     ) -> None:
-        self.mode, self.control, self.cycles = mode, control or WearControl(), cycles
-        if self.control.stepper not in STEPPERS:
-            raise InputError("unknown stepper", None, self.control.stepper, ", ".join(STEPPERS), "choose one of these")
+        self.mode, self.control, self.cycles = mode, control or WearControl(), positive("cycles", cycles)
         self.tableau = STEPPERS[self.control.stepper]
         self.reports = sorted({*(value for value in report_at if value > at), cycles})
         self.eta, self.reason, self.converged = at, "", False

@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..columns import Column, columns_named
 from ..errors import InputError
+from ..given import positive
 from ..hb.harmonic_problem import HarmonicProblem
 from .branch import Branch
 from .steps import WearControl
@@ -110,7 +111,8 @@ def wear(
     Raises
     ------
     InputError
-        The branch does not pass the amplitude, a contact cannot wear, or the cycles are no number of vibrations.
+        The branch does not pass the amplitude, a contact cannot wear, a number is not above zero, or the cycles are no
+        number of vibrations.
     StageFailed
         Newton does not find the start.
     """
@@ -124,7 +126,8 @@ def wear(
     problem, rows, states = branch.problem, [], []
     with WornMode(problem, coefficient, areas) as mode:
         unworn = np.zeros(len(mode.areas))
-        unit = mode.cycle_unit(mode.measure(first, unworn).load, cycles, cycle_unit)
+        given = None if cycle_unit is None else positive("cycle_unit", cycle_unit)
+        unit = mode.cycle_unit(mode.measure(first, unworn).load, cycles, given)
         new = mode.solve(unworn, guess)
         for vector in (first, guess):
             vector.destroy()

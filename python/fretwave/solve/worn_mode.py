@@ -11,6 +11,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..given import numbers, positive
 from ..hb.harmonic_problem import HarmonicProblem
 from ..model.law_info import Role
 from ..model.laws import law_like
@@ -63,16 +64,24 @@ class WornMode(Destroyable):
         k_w [1/pressure].
     areas : dict
         Contact name -> nodal areas I (n_pairs,) [length^2]; contacts without an entry do not wear.
+
+    Raises
+    ------
+    InputError
+        There is no such contact, or it cannot wear; a coefficient or an area is no number above zero.
     """
 
     def __init__(self, problem: HarmonicProblem, coefficient: float, areas: Mapping[str, Array]) -> None:
-        self.problem, self.model, self.coefficient = problem, problem.model, coefficient
+        self.problem, self.model, self.coefficient = problem, problem.model, positive("coefficient", coefficient)
         names = [contact.name for contact in self.model.contacts]
         for name in areas:
             self._check(name, names)
         self.contacts = [k for k, name in enumerate(names) if name in areas]
-        self.areas = np.concatenate([np.asarray(areas[names[k]], dtype=float) for k in self.contacts])
-        sizes = [len(areas[names[k]]) for k in self.contacts]
+        if not self.contacts:
+            raise InputError("no contact wears", "areas", "none", f"areas of {', '.join(names)}", "name one that wears")
+        sizes = [self.model.contacts[k].n_pairs for k in self.contacts]
+        each = [numbers(f"areas['{names[k]}']", areas[names[k]], (n,), above=0.0) for k, n in zip(self.contacts, sizes)]
+        self.areas = np.concatenate(each)
         self.slices = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes))]
         self.stiffness = self._values(Role.NORMAL_STIFFNESS)  # makes worn depth a loss of normal load
         self._newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)

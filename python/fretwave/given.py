@@ -1,0 +1,71 @@
+"""Numbers as scripts give them, refused in one sentence where they are none. Those of case files have types of keys."""
+
+from __future__ import annotations
+
+import operator
+
+import numpy as np
+
+from .arrays import Array
+from .errors import InputError
+
+
+def whole(value: object) -> int | None:
+    """The whole number that it is, NumPy's too; None of any other thing."""
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        return None
+
+
+def place(name: str, value: object, count: int) -> int:
+    """One of 0 .. count - 1.
+
+    Raises
+    ------
+    InputError
+    """
+    found = whole(value)
+    if found is None or not 0 <= found < count:
+        raise InputError(f"there is no such {name}", None, repr(value), f"0 to {count - 1}", "choose one of these")
+    return found
+
+
+def positive(name: str, value: object) -> float:
+    """A finite number above zero.
+
+    Raises
+    ------
+    InputError
+    """
+    return float(numbers(name, value, above=0.0))
+
+
+def not_negative(name: str, value: object) -> float:
+    """A finite number, zero or more.
+
+    Raises
+    ------
+    InputError
+    """
+    return float(numbers(name, value, least=0.0))
+
+
+def numbers(
+    name: str, values: object, shape: tuple[int, ...] = (), above: float = -np.inf, least: float = -np.inf
+) -> Array:
+    """Finite numbers of a shape, above a bound or from a least one on.
+
+    Raises
+    ------
+    InputError
+    """
+    found = np.asarray(values)
+    real = found.dtype.kind in "biuf" and found.shape == shape and bool(np.isfinite(found).all())
+    if not real or not ((found > above) & (found >= least)).all():
+        bound = f", > {above:g}" if above > -np.inf else f", >= {least:g}" if least > -np.inf else ""
+        wanted = f"{shape} finite numbers{bound}" if shape else f"a finite number{bound}"
+        shown = repr(values) if found.size <= 4 else str(found.shape)
+        fix = "give such numbers" if shape else "give such a number"
+        raise InputError("a number cannot be used", name, shown, wanted, fix)
+    return found.astype(float)

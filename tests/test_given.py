@@ -1,0 +1,144 @@
+"""Numbers that a script gives and no key of a case has looked at: one sentence, and no result made of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fretwave as fw
+from fretwave import given
+
+NAN, INF = float("nan"), float("inf")
+M, K = np.diag([1.0, 0.02]), np.array([[640.0, -40.0], [-40.0, 40.0]])
+MODE = fw.LinearMode(1.0, 0.0, np.array([1.0, 0.0]), np.zeros(2))
+STILL = np.zeros(2)
+SIDE = {"normal_stiffness": 100.0, "tangential_stiffness": 40.0, "friction_coefficient": 0.5, "normal_load": 3.0}
+
+
+def refused(work: Callable[[], object]) -> str:
+    with pytest.raises(fw.InputError) as error:
+        work()
+    return str(error.value)
+
+
+@pytest.mark.parametrize("value, found", [(3, 3), (np.int8(3), 3), (np.array(3), 3), (True, 1)], ids=str)
+def test_whole_numbers_of_any_kind_are_some(value: Any, found: int) -> None:
+    assert given.whole(value) == found and given.place("dof", value, 4) == found
+
+
+@pytest.mark.parametrize("value", [3.0, "3", None, [3], 1j, NAN], ids=str)
+def test_nothing_else_is_a_whole_number(value: Any) -> None:
+    assert given.whole(value) is None and "0 to 8" in refused(lambda: given.place("dof", value, 9))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, NAN, INF, "1", None, 1j, [1.0], [1.0, 2.0]], ids=str)
+def test_a_positive_number_is_finite_and_one(value: Any) -> None:
+    assert "> 0" in refused(lambda: given.positive("x", value))
+
+
+@pytest.mark.parametrize("value", [-1e-300, NAN, -INF, "1", None, [0.0]], ids=str)
+def test_one_that_is_not_negative_may_be_zero(value: Any) -> None:
+    assert ">= 0" in refused(lambda: given.not_negative("x", value)) and given.not_negative("x", 0) == 0.0
+
+
+@pytest.mark.parametrize("ratios", [-0.1, NAN, INF, 0.1j, [0.1, -0.1], {2: NAN}, np.array([0.1, -0.2])], ids=str)
+def test_a_damping_ratio_is_not_negative(ratios: Any) -> None:
+    """The matrix was made of nan."""
+    assert "damping ratio" in refused(lambda: fw.modal_damping(M, K, ratios))
+
+
+def test_damping_ratios_may_stand_in_an_array() -> None:
+    one, other = (fw.modal_damping(M, K, ratios)[0].toarray() for ratios in ([0.01, 0.02], np.array([0.01, 0.02])))
+    assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("sectors", [-2, 0, 1, 2.5, NAN], ids=str)
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda n: fw.deviations(n, 0.02),
+        lambda n: fw.travelling_wave(MODE, 1, n),
+        lambda n: fw.standing_wave(MODE, 1, n, 0),
+        lambda n: fw.Aerodynamics.from_damping({0: 0.1}, n, 1.0),
+        lambda n: fw.match_faces(np.eye(3), [0], [1], n),
+        lambda n: fw.modal_damping(M, K, 0.1, sectors=n or 1),
+    ],
+)
+def test_a_wheel_has_two_sectors_or_more(work: Callable[[Any], object], sectors: Any) -> None:
+    """Division by zero, numbers of a wheel of one sector, or nan."""
+    assert "two sectors" in refused(lambda: work(sectors))
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda: fw.standing_wave(MODE, 1, 6, 9),  # the crest stood in another sector
+        lambda: fw.standing_wave(MODE, 1, 6, 0, 7),
+        lambda: fw.standing_wave(MODE, 1, 6, 1),  # a dof that does not move: nan
+        lambda: fw.deviations(6, -0.1),
+        lambda: fw.deviations(6, NAN),
+        lambda: fw.deviations(6, 0.1, -1),
+        lambda: fw.Aerodynamics({0: 1j}, INF),
+        lambda: fw.Aerodynamics({0: complex(NAN, 0.0)}, 1.0),
+        lambda: fw.Aerodynamics.from_damping({0: NAN}, 6, 1.0),  # no coefficient was left
+        lambda: fw.match_faces(np.eye(3), [0], [9], 4),
+        lambda: fw.match_faces(np.eye(3), [-1], [1], 4),
+        lambda: fw.StepControl(max_points=3.5),  # type: ignore[arg-type]
+        lambda: fw.StepControl(initial="a"),  # type: ignore[arg-type]
+        lambda: fw.WearControl(stepper="euler"),
+    ],
+)
+def test_what_is_not_there_makes_nothing(work: Callable[[], object]) -> None:
+    refused(work)
+
+
+@pytest.mark.parametrize("name", ["t_end", "dt_out", "rtol", "limit", "most_steps"])
+@pytest.mark.parametrize("value", [0.0, -1.0, NAN], ids=str)
+def test_integration_in_time_has_positive_numbers(name: str, value: float) -> None:
+    """With rtol = nan steps had no control."""
+    options = {"t_end": 1.0, "dt_out": 0.1, name: value}
+    assert re.search(f"{name}|duration", refused(lambda: fw.Transient(fw.Model(M, K)).run(STILL, STILL, **options)))
+
+
+def test_integration_in_time_has_an_end() -> None:
+    assert "t_end" in refused(lambda: fw.Transient(fw.Model(M, K)).run(STILL, STILL, INF, 0.1))
+
+
+@pytest.fixture(scope="module")
+def worn() -> fw.Branch:
+    side = fw.Contact("coulomb_2d", np.eye(2), SIDE)
+    model = fw.Model(M, K, contacts=[side])
+    problem = fw.NonlinearMode(model, fw.choose_harmonics(model, 1), dof=1, rest=fw.balanced(model))
+    return fw.follow(problem, 0.01, 0.2)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        *({name: value} for name in ("coefficient", "cycles", "cycle_unit") for value in (0.0, -1.0, NAN)),
+        *({"areas": areas} for areas in ({}, *({"contact": a} for a in ([0.0], [-1.0], [1.0, 1.0], 1.0, [NAN])))),
+        {"amplitude": NAN},
+    ],
+    ids=str,
+)
+def test_wear_has_positive_numbers(changed: dict[str, Any], worn: fw.Branch) -> None:
+    """Negative ones ended "wear has stopped", as asked; two areas made two pairs of one, areas of zero no end."""
+    options = {"amplitude": 0.1, "coefficient": 1e-3, "areas": {"contact": [1.0]}, "cycles": 1.0, **changed}
+    assert next(iter(changed)) in refused(lambda: fw.wear(worn, **options))
+
+
+@pytest.mark.parametrize(
+    "stop", [-1.0, NAN, (0.2, NAN), (-0.1, 0.2), (0.1, 0.2, 0.3), (0.1, 0.2), (0.001, 0.005)], ids=str
+)
+def test_a_branch_ends_where_it_can_get_to(stop: Any, worn: fw.Branch) -> None:
+    """From outside its range it went round and was told to be a closed loop; below zero Newton met nan."""
+    refused(lambda: fw.follow(worn.problem, 0.01, stop))
+
+
+def test_a_branch_is_one_of_a_problem(worn: fw.Branch) -> None:
+    assert "Branch" in refused(lambda: fw.follow(worn, 0.1, 0.2))  # type: ignore[arg-type]
+    assert "LinearMode" in refused(lambda: fw.follow(MODE, 0.1, 0.2))  # type: ignore[arg-type]
