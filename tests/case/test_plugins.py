@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from tolerances import SOLVED
 
 from fretwave import registry
 from fretwave.case import plugins
-from fretwave.case.analysis import forget_analysis
+from fretwave.case.analysis import AnalysisSection, forget_analysis
 from fretwave.case.load import load_case
 from fretwave.results.reader import Run
 
@@ -392,3 +393,12 @@ def test_a_script_may_register_again_what_it_changed(monkeypatch) -> None:
         assert registry.kinds()["receptance"] is notebook.Receptance
     forget_analysis(notebook.Receptance)
     assert "receptance" not in registry.kinds()
+
+
+def test_the_recipe_names_all_that_a_kind_may_have_of_its_own() -> None:
+    """What the package's own kinds change of `AnalysisSection` stands in CONTRIBUTING."""
+    recipe = (Path(__file__).parents[2] / "src" / "CONTRIBUTING.md").read_text()
+    general = {name for name in vars(AnalysisSection) if not name.startswith(("_", "model_"))}
+    classes = {base for kind in registry.kinds().values() for base in kind.__mro__ if issubclass(base, AnalysisSection)}
+    own = {name for one in classes - {AnalysisSection} for name in general & set(vars(one))}
+    assert "spins" in own and [name for name in sorted(own) if not re.search(rf"`[^|]*\b{name}\b", recipe)] == []
