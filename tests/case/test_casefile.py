@@ -276,7 +276,7 @@ def test_changed_keys_are_named() -> None:
     assert load_case(CASE).digest == load_case(CASE, ["mode.harmonics=21"]).digest
 
 
-@pytest.mark.parametrize("kind", ["save_npz", "savez", "mtx"])
+@pytest.mark.parametrize("kind", ["save_npz", "savez", "mtx", "NPZ"])
 def test_matrices_from_files(write, tmp_path: Path, kind: str) -> None:
     M = np.diag([1.0, 0.02])
     name = "M.mtx" if kind == "mtx" else "M.npz"
@@ -284,6 +284,9 @@ def test_matrices_from_files(write, tmp_path: Path, kind: str) -> None:
         scipy.sparse.save_npz(tmp_path / name, scipy.sparse.csr_matrix(M))
     elif kind == "savez":
         np.savez(tmp_path / name, M=M)
+    elif kind == "NPZ":
+        np.savez(tmp_path / name, M=M)
+        (tmp_path / name).rename(tmp_path / (name := "M.NPZ"))
     else:
         scipy.io.mmwrite(str(tmp_path / name), scipy.sparse.csr_matrix(M))
     path = write(("[[1.0, 0.0], [0.0, 0.02]]", f'"{name}"'))
@@ -296,6 +299,21 @@ def test_damaged_matrix_file(write, tmp_path: Path) -> None:
     (tmp_path / "M.npz").write_bytes(b"not an archive")
     [problem] = problems(write(("[[1.0, 0.0], [0.0, 0.02]]", '"M.npz"')))
     assert "cannot be read" in problem.what
+
+
+@pytest.mark.parametrize("name, imported", [("M.npy", True), ("M.mat", True), ("M.csv", False)])
+def test_a_matrix_of_another_program_is_told_its_way(write, tmp_path: Path, name: str, imported: bool) -> None:
+    """It was to be written with save_npz('M.csv', M), which makes another file, M.csv.npz."""
+    M = np.diag([1.0, 0.02])
+    if name.endswith(".npy"):
+        np.save(tmp_path / name, M)
+    elif name.endswith(".mat"):
+        scipy.io.savemat(tmp_path / name, {"M": M})
+    else:
+        np.savetxt(tmp_path / name, M, delimiter=",")
+    [problem] = problems(write(("[[1.0, 0.0], [0.0, 0.02]]", f'"{name}"')))
+    assert problem.fix is not None and "save_npz('M.npz', M)" in problem.fix
+    assert ("fretwave import" in problem.fix) == imported
 
 
 def test_pairs_between_dofs(write) -> None:

@@ -17,6 +17,9 @@ from ..texts import display, is_there, nearest, shortened
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 
+#: Endings of files that a case reads without a plug-in.
+READ = (".npz", ".mtx")
+
 
 def load(
     letter: str,
@@ -85,7 +88,7 @@ def _read(path: Path, letter: str, where: str) -> Sparse:
             where=where,
             measured=f"{display(path)}: {shortened(str(error) or type(error).__name__)}",
             expected=f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx",
-            fix=f"write it with scipy.sparse.save_npz('{path.name}', {letter})",
+            fix=_another_way(path, letter),
         ) from None
     if np.iscomplexobj(sparse):
         raise InputError(
@@ -97,6 +100,16 @@ def _read(path: Path, letter: str, where: str) -> Sparse:
     return sparse.astype(float)
 
 
+def _another_way(path: Path, letter: str) -> str:
+    """To the matrix of a file that a case does not read."""
+    from ..importers.formats import format_of
+
+    written = f"write it with scipy.sparse.save_npz('{path.with_suffix('.npz').name}', {letter})"
+    if path.suffix.lower() in READ or not path.is_file() or format_of(path) is None:
+        return written
+    return f'`fretwave import` brings it into a model file, file = "{display(path.with_suffix(".h5"))}"; or {written}'
+
+
 def _read_known(path: Path, letter: str) -> Any:
     from ..importers import formats, matrix_market
 
@@ -104,7 +117,7 @@ def _read_known(path: Path, letter: str) -> Any:
         return _as_given(format.read(path, letter, None), letter)
     if path.suffix.lower() == ".mtx":
         return _as_given(matrix_market.read(path), letter)
-    if path.suffix != ".npz":
+    if path.suffix.lower() != ".npz":
         raise ValueError(f"unknown file type '{path.suffix}'")
     with np.load(path) as archive:
         if "format" not in archive.files:

@@ -133,6 +133,12 @@ def registered(path: Path) -> Format | None:
     return next((one for one in _registered.values() if one.tells(b"", path)), None)
 
 
+def format_of(path: Path) -> Format | None:
+    """The format of a file that is there, as its first bytes tell it; None where none of them is."""
+    head = head_of(path, 520)
+    return next((one for one in (*_registered.values(), *FORMATS) if one.tells(head, path)), None)
+
+
 def read_matrix(given: str, letter: str) -> Entries:
     """Read one matrix; the file's first bytes tell its format.
 
@@ -153,7 +159,7 @@ def read_matrix(given: str, letter: str) -> Entries:
         fix = nearest(path.name, names_beside(path)) or "check the path"
         raise InputError(f"the file of {letter} does not exist", display(path), None, "a matrix file", fix)
     with readable(path, f"file of {letter}"):
-        return _read(path, head_of(path, 520), variable, letter)
+        return _read(path, variable, letter)
 
 
 @contextmanager
@@ -185,15 +191,15 @@ def split(given: str) -> tuple[Path, str | None]:
     return Path(given), None
 
 
-def _read(path: Path, head: bytes, variable: str | None, letter: str) -> Entries:
-    for one in (*_registered.values(), *FORMATS):
-        if one.tells(head, path):
-            found = one.read(path, letter, variable)
-            return found if isinstance(found, Entries) else Entries.of(found, display(path), one.name)
+def _read(path: Path, variable: str | None, letter: str) -> Entries:
+    one = format_of(path)
+    if one is not None:
+        found = one.read(path, letter, variable)
+        return found if isinstance(found, Entries) else Entries.of(found, display(path), one.name)
     raise InputError(
         f"the format of the file of {letter} is not known",
         display(path),
-        f"it begins with {head[:24]!r}",
+        f"it begins with {head_of(path, 24)!r}",
         ", ".join(one.name for one in (*FORMATS, *_registered.values())),
         "write it with scipy.sparse.save_npz or scipy.io.mmwrite",
     )
