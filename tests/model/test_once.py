@@ -82,3 +82,13 @@ def test_no_body_stands_twice() -> None:
             homes[body].append(f"{path.relative_to(PACKAGE)}: {name}")
     twice = [" = ".join(places) for places in homes.values() if len(places) > 1]
     assert not twice, "\n".join(twice)
+
+
+@pytest.mark.parametrize(
+    "call, home",
+    [("os.replace", "files/whole.py"), ("os.rename", "files/whole.py"), ("operator.index", "given.py")],
+)
+def test_what_has_one_home_is_called_there_alone(call: str, home: str) -> None:
+    """A view took its place beside `files.whole`, and was not brought to the disk; three modules asked for an int."""
+    found = {str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py") if f"{call}(" in path.read_text()}
+    assert found <= {home}

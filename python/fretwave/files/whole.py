@@ -93,14 +93,19 @@ def replaced(path: Path, own: bool = False, keep_suffix: bool = False, sync: boo
     with told(path):
         try:
             yield fresh
-            if sync:
-                bring_to_disk(fresh)
-            os.replace(fresh, path)
-            if sync:
-                bring_to_disk(path.parent)
+            take_place(fresh, path, sync)
         finally:
             with suppress(OSError):
                 fresh.unlink()
+
+
+def take_place(fresh: Path, path: Path, sync: bool = True) -> None:
+    """A file that was written beside its place is brought to the disk and takes it; `sync` as of `replaced`."""
+    if sync:
+        bring_to_disk(fresh)
+    os.replace(fresh, path)
+    if sync:
+        bring_to_disk(path.parent)
 
 
 def _forget_unfinished(path: Path) -> None:

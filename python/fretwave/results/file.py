@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..files.dimensions import put_array
 from ..files.streams import behind
-from ..files.whole import Unfailing, beside, bring_to_disk, check_whole, seal, sealed_size, told
+from ..files.whole import Unfailing, beside, check_whole, seal, sealed_size, take_place, told
 from ..texts import display
 from ..units import units_of
 from .journal import unfinished
@@ -69,9 +69,7 @@ class NewResults:
             self._close()
             with told(self._path):
                 seal(self._fresh)
-                bring_to_disk(self._fresh)
-                os.replace(self._fresh, self._path)
-                bring_to_disk(self._path.parent)
+                take_place(self._fresh, self._path)
         finally:
             self.discard()
 

@@ -8,7 +8,6 @@ Plain serial h5py. ParaView reads such files from version 5.12 on (VTK 9.3).
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ import numpy.typing as npt
 from ..arrays import AnyArray, Array, Indices, IntArray
 from ..errors import InputError
 from ..files.streams import behind, refuse_stream
+from ..files.whole import beside, take_place, told
 from ..model.cells import KINDS
 from ..texts import display
 from ..units import ATTRIBUTE, SI, UnitSystem
@@ -58,7 +58,7 @@ class GridFile:
         refuse_stream(path)
         path = behind(path)
         self.path, self.steps = path, len(values)
-        self._unfinished = path.with_name(f".{path.name}.new")
+        self._unfinished = beside(path)
         self._file = _create(self._unfinished)
         self._file.attrs[ATTRIBUTE] = units.name
         self._root = self._file.create_group("VTKHDF", track_order=True)
@@ -186,7 +186,8 @@ class GridFile:
             self._root["Steps/NumberOfParts"] = np.full(self.steps, parts, dtype="i8")
         self._file.close()
         if kind is None and not missing:
-            os.replace(self._unfinished, self.path)
+            with told(self.path):
+                take_place(self._unfinished, self.path)
         else:
             self._unfinished.unlink(missing_ok=True)
         if kind is None and missing:
