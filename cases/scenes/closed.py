@@ -1,4 +1,4 @@
-"""Closed forms (REFERENCE) as judges of a run: each function makes one that returns what is wrong.
+"""Closed forms as judges of a run: each function makes one that returns what is wrong.
 
 Tolerances are those of the sampling or of the harmonics left out, said where they are given.
 """

@@ -1,4 +1,4 @@
-"""The equations of a scene (DESIGN, section 1) in NumPy: residual, exact Jacobian and distance from the branch.
+"""The equations of a scene in NumPy: residual, exact Jacobian and distance from the branch.
 
     (K + s_n C + s_n^2 M) q_n + B^T F_n = P_n,    q_n = Qc_n - i Qs_n
 

@@ -1,4 +1,4 @@
-"""Contact laws for the judge, written from their definitions (DESIGN, section 6), at every time of the period.
+"""Contact laws for the judge, written from their definitions (`src/contact`), at every time of the period.
 
 Every function takes one period of motion as coefficients (m, lanes) of waves. Lanes share their real part, which says
 where states change; a motion u + 1e-30 i du gives the force's exact derivative along du in the imaginary part. Nothing

@@ -8,7 +8,7 @@
 namespace fretwave::contact {
 
 /// One period of relative motion of all pairs on this rank. Arrays are samples x components x pairs, pairs
-/// innermost (DESIGN fact 7).
+/// innermost, so that loops over them are vectorised.
 struct Motion {
   int samples = 0;  ///< samples held here (half a period when the motion is half-wave symmetric)
   int components = 0, pairs = 0;
@@ -90,8 +90,8 @@ class Law {
   virtual bool uses_displacement() const { return true; }
   virtual bool uses_velocity() const { return true; }
   /// The force depends on the path of the displacement (never on the velocity). Such a law is read on a
-  /// period that its sliders close, of all such the one nearest to the rest state (DESIGN fact 3 without the
-  /// transient), in continuous time: it has `integration` and is not sampled.
+  /// period that its sliders close, of all such the one nearest to the rest state (from elsewhere the mean
+  /// tangential force is arbitrary), in continuous time: it has `integration` and is not sampled.
   virtual bool hereditary() const { return false; }
   /// The static state the dynamics start from: relative displacement components x pairs, reached in one step
   /// from sliders that stand at zero, or at `from` (tangents x pairs).

@@ -31,10 +31,10 @@ struct Wearing {
   std::vector<double> slip, open;  ///< shares of the period
 };
 
-/// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement
-/// in, of force out. Blocks are (pairs x components) x block size. Never communicates. Laws that are
-/// integrated in continuous time are not sampled: ContinuousForce has their force; samples are for those who
-/// look.
+/// Alternating frequency-time (Laxalde et al. 2008, section 2.2) for the contact pairs of this rank: harmonic
+/// blocks of relative displacement in, of force out. Blocks are (pairs x components) x block size. Never
+/// communicates. Laws that are integrated in continuous time are not sampled: ContinuousForce has their
+/// force; samples are for those who look.
 class Aft {
  public:
   Aft(Harmonics const&, std::shared_ptr<contact::Law const>);

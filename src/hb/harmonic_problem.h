@@ -28,8 +28,8 @@ using Row = std::vector<std::pair<PetscInt, double>>;
 
 /// y = (q, tau, z): scaled harmonic blocks q = (Q - Q_static) / a, then on the last rank the unfolding tau,
 /// if any, and the scalars z; z's last entry is the continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref
-/// a), then, on the last rank, w . q = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4),
-/// and the unfolding's.
+/// a), then, on the last rank, w . q = (1, 0) in the fundamental if there are three scalars (Laxalde et al.
+/// 2008, eqs. 11 and 12), and the unfolding's.
 class HarmonicProblem : public solve::Problem {
  public:
   HarmonicProblem(model::Model const&, Harmonics const&, int scalars, Row row, double reference_stiffness);

@@ -3,7 +3,7 @@
 
 namespace fretwave::hb {
 
-/// Which exponents the motion of a mode has; all results say which one it is (DESIGN section 1).
+/// Which exponents the motion of a mode has; all results say which one it is.
 enum class Method {
   CNM,  ///< complex nonlinear mode, s_n = n (-beta + i w) (Laxalde et al. 2008, eq. 4)
   EPMC  ///< extended periodic motion concept, s_n = i n w0, damping C - 2 zeta w0 M (Krack 2015)

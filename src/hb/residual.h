@@ -31,8 +31,8 @@ struct EnergyBalance {
 /// One vector per contact, of this rank's pairs.
 using PerContact = std::vector<std::vector<double>>;
 
-/// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) and its exact derivatives: one for all variants, which differ in what
-/// s is (DESIGN section 1). Vectors hold harmonic blocks of `block_size` per dof.
+/// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) (Laxalde et al. 2008, eq. 10) and its exact derivatives: one for all
+/// variants, which differ in what s is. Vectors hold harmonic blocks of `block_size` per dof.
 class Residual {
  public:
   Residual(model::Model const&, Harmonics const&);

@@ -4,9 +4,10 @@
 
 namespace fretwave::hb {
 
-/// Unknowns and rows that take the double mode of a tuned wheel apart (DESIGN fact 6): a fundamental force
-/// along M phi with two unknown amplitudes tau, and two rows that keep the fundamental's component phi^H M
-/// q_1 at zero; phi = re + i im is the linear mode that the motion shall not turn into. None by default.
+/// Unknowns and rows that take the double mode of a tuned wheel apart, where with one dof normalised the
+/// Jacobian loses rank by 2 as a -> 0: a fundamental force along M phi with two unknown amplitudes tau, and
+/// two rows that keep the fundamental's component phi^H M q_1 at zero; phi = re + i im is the linear mode
+/// that the motion shall not turn into. None by default.
 class Unfolding {
  public:
   Unfolding() = default;

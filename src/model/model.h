@@ -11,8 +11,8 @@ namespace fretwave::model {
 
 class StuckBasis;
 
-/// One linear term: sparse A (n_dof x n_dof) on the p-th time derivative, with spatial phase k (DESIGN
-/// section 3): Z_n = sum s_n^p e^{-i k n theta} A.
+/// One linear term: sparse A (n_dof x n_dof) on the p-th time derivative, with spatial phase k
+/// (python/fretwave/cyclic/sector.py): Z_n = sum s_n^p e^{-i k n theta} A.
 struct Term {
   MatHandle A;
   int order = 0;
@@ -48,7 +48,7 @@ class Model {
   PetscInt local_dofs() const { return local_; }
   PetscInt dofs() const { return global_; }
   PetscInt first_dof() const { return first_; }
-  /// Angle between the motions of neighbouring sectors at harmonic 1, 2 pi ND / N (DESIGN section 3).
+  /// Angle between the motions of neighbouring sectors at harmonic 1, 2 pi ND / N.
   double theta() const { return theta_; }
   /// Dofs of one sector of a whole wheel, whose sectors follow one another; 0: not a wheel.
   PetscInt unit() const { return unit_; }

@@ -19,8 +19,8 @@ struct ModalBorder {
 ///
 ///     N_n = z_n + U_l^T X U_l
 ///
-/// of the lower modes, that of the fundamental with its border, without which it is singular at an eigenvalue
-/// (DESIGN fact 5). Arrays hold the range's coefficients innermost, filled up with zeros to `lead`.
+/// of the lower modes, that of the fundamental with its border, without which it is singular at an
+/// eigenvalue. Arrays hold the range's coefficients innermost, filled up with zeros to `lead`.
 class ModalBlocks {
  public:
   /// Harmonics first to last - 1.

@@ -65,7 +65,7 @@ std::vector<Rotation> PairwisePreconditioner::gather_contact(std::vector<PairTan
   return gathered(std::span<Rotation const>(tangents), problem_.comm());
 }
 
-/// e^{-i k n theta}, which another sector's displacement carries (DESIGN section 3).
+/// e^{-i k n theta}, which another sector's displacement carries (model::Term).
 complex PairwisePreconditioner::phase(Weight const& w, int harmonic) const {
   return std::polar(1.0, -w.phase * problem_.harmonics().orders()[harmonic] * problem_.model().theta());
 }

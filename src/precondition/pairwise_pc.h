@@ -11,7 +11,7 @@ using namespace hb;
 /// derived classes; then what the contact couples between harmonics, in its own coefficients
 /// (`CoupledPairs`): J^-1 ~ P^-1 - P^-1 B^H F B P^-1, F that of all pairs together. The
 /// fundamental's block is inverted with the scalars' columns, the normalisation and the closing row, without
-/// which it is singular at an eigenvalue (DESIGN fact 5). Every rank inverts its share of the harmonics and
+/// which it is singular at an eigenvalue. Every rank inverts its share of the harmonics and
 /// has the forces of its pairs. What slips changes with every step of Newton's: F follows it, P is kept.
 class PairwisePreconditioner : public solve::Preconditioner {
  public:

@@ -18,7 +18,7 @@ struct Fallbacks {
 };
 
 /// The bordered system linearised at a point, for Newton's steps and for solves beside them (tangents). Two
-/// routes (DESIGN section 4), chosen by size or by -<prefix>route: direct (assembled, LU) and krylov
+/// routes, chosen by size or by -<prefix>route: direct (assembled, LU) and krylov
 /// (matrix-free product, a kind of preconditioner for such problems, rebuilt when iterations rise). PETSc
 /// options apply under the prefix; ours are only its defaults. Solves beside Newton's have a KSP of their
 /// own, prefix <prefix>tangent_, with the same operator and preconditioner: how roughly Newton's steps are

@@ -49,7 +49,7 @@ Newton::Newton(Problem& problem, std::string const& prefix, bool past_kinks)
   check(SNESCreate(problem.comm(), snes_.out()));
   check(SNESSetOptionsPrefix(snes_, prefix.c_str()));
   check(SNESSetFunction(snes_, nullptr, form_function, this));
-  // The residual is dimensionless (DESIGN fact 4), so one absolute tolerance serves every case.
+  // The residual is dimensionless (hb::HarmonicProblem), so one absolute tolerance serves every case.
   check(SNESSetTolerances(snes_, 1e-10, 1e-50, 0, 25, 1000));
   check(SNESSetConvergenceTest(snes_, converged, this, nullptr));
   linear_ = std::make_unique<LinearSolver>(bordered_, prefix, snes_);

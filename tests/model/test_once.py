@@ -92,3 +92,15 @@ def test_what_has_one_home_is_called_there_alone(call: str, home: str) -> None:
     """A view took its place beside `files.whole`, and was not brought to the disk; three modules asked for an int."""
     found = {str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py") if f"{call}(" in path.read_text()}
     assert found <= {home}
+
+
+def test_no_comment_leans_on_a_document_that_is_not_here() -> None:
+    """They cited facts and sections of a plan that is no part of the repository."""
+    root = PACKAGE.parents[1]
+    files = [
+        path
+        for part in ("src", "cases", "python")
+        for end in ("h", "cpp", "py")
+        for path in (root / part).rglob(f"*.{end}")
+    ]
+    assert [str(path) for path in files if "DESIGN" in path.read_text()] == []

@@ -47,6 +47,8 @@ class _Columns(ABC):
 class ModalState(_Columns):
     """Scalars (beta / w_ref, w / w_ref, log a, ...) of a nonlinear mode; w = w0 for EPMC.
 
+    lambda = -beta + i omega, omega0 = |lambda|, zeta = beta / omega0 (Laxalde et al. 2008, eq. 1).
+
     Examples
     --------
     >>> ModalState("CNM", 10.0)([0.3, 0.4, 0.0])["zeta"]

@@ -36,7 +36,7 @@ def motion(labels: Sequence[str], coefficients: Array, beta: float, omega: float
     """Displacement and velocity (n + 1, n_dof) over one closed period (first = last).
 
     The factor e^{-n beta t} is left out, as in the alternating frequency-time scheme; the velocity follows from
-    s_n = n (-beta + i omega) (Laxalde et al. 2008, Eq. 6).
+    s_n = n (-beta + i omega) (Laxalde et al. 2008, eq. 6).
     """
     phase = 2.0 * np.pi * np.arange(n + 1) / n
     x, v = np.zeros((n + 1, len(coefficients))), np.zeros((n + 1, len(coefficients)))

@@ -138,7 +138,7 @@ def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAna
 def _wave(
     context: AnalysisContext[ModeAnalysis], tuned: LinearMode, sector: int
 ) -> tuple[LinearMode, Optional[Complex]]:
-    """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6)."""
+    """A wave of the tuned wheel, and the other of its pair, to be avoided."""
     from ...cyclic.wheel_modes import standing_wave, travelling_wave
 
     analysis = context.analysis
