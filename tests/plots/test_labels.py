@@ -167,3 +167,17 @@ def test_what_no_branch_of_a_sweep_has_is_not_named() -> None:
     assert not sweep_overview._has_amplitudes(
         {name: np.full(3, np.nan) for name in (*sweep_overview.AMPLITUDES, "stable_limit_cycle")}
     )
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 7, 8])
+def test_a_legend_above_the_axes_is_read_row_by_row(count: int) -> None:
+    """Seven amplitudes stood in the order 1, 3, 4, 5, 6, 7 and below them 2, for a legend is filled by columns."""
+    figure, axes = style.new_figure(4.0)
+    for k in range(count):
+        axes.plot([0.0, 1.0], [k, k], label=f"amplitude {k}")
+    style.legend_outside(figure, axes, columns=6)
+    figure.canvas.draw()
+    [legend] = figure.legends
+    places = {text.get_text(): text.get_window_extent() for text in legend.get_texts()}
+    read = sorted(places, key=lambda name: (-round(places[name].y0), places[name].x0))
+    assert read == [f"amplitude {k}" for k in range(count)]

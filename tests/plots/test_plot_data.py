@@ -9,6 +9,7 @@ import pytest
 from matplotlib.colors import to_rgba
 from models.duffing import C, mode, response, stiffness
 from models.kept_branches import relative, write_branches
+from models.legends import legend_texts
 from models.table_rows import SHARED as COMMON
 from tolerances import ROUNDING, SOLVED
 
@@ -53,10 +54,6 @@ def chord_error(x, y, points, truth):
     """Of straight lines between the points, at the abscissas of a line."""
     kept = np.isin(x, points)
     return relative(np.interp(x, x[kept], y[kept]), truth(x))
-
-
-def texts(figure):
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
 def line_named(axes, start):
@@ -166,7 +163,7 @@ def test_a_sweep_draws_the_branch_of_every_value(tmp_path, comm):
             a, y = axes.lines[number].get_xydata().T
             assert len(a) == 8 * (parts[number].points - 1) + 1
             assert relative(y, truth(a, damping)) < CUBIC
-    assert texts(found["sweep_backbones"])[:2] == ["c = 0.02", "c = 0.06"]
+    assert legend_texts(found["sweep_backbones"])[:2] == ["c = 0.02", "c = 0.06"]
     _, damping_axes = found["sweep_summary"].axes
     x, zeta = damping_axes.lines[0].get_xydata().T
     np.testing.assert_allclose(x, values)

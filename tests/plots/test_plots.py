@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from command_line import call
+from models.legends import legend_texts
 from models.table_rows import SHARED
 from tolerances import ROUNDING
 
@@ -99,11 +100,6 @@ def run(folder):
     return Run(folder)
 
 
-def texts(figure):
-    """Every legend entry of a figure."""
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-
-
 def dashes(axes):
     return [line.get_linestyle() for line in axes.get_lines()]
 
@@ -178,8 +174,8 @@ def test_backbone_shows_both_methods_both_asymptotes_folds_and_peak(run):
     upper, lower = figure.axes
     assert [text.get_text() for text in upper.texts] == ["stuck 4.027 Hz", "free 3.852 Hz"]
     assert {"--", "-."} <= set(dashes(upper))
-    assert any(text.startswith("CNM, H = 3: peak ζ 4 % at 0.2 m") for text in texts(figure))
-    assert "fold in amplitude" in texts(figure)
+    assert any(text.startswith("CNM, H = 3: peak ζ 4 % at 0.2 m") for text in legend_texts(figure))
+    assert "fold in amplitude" in legend_texts(figure)
     assert lower.get_xscale() == "log"
     assert lower.get_xlabel() == "Modal amplitude of m1 [m]"
     assert len(upper.child_axes) == len(lower.child_axes) == 1  # close-up of the folds
@@ -199,7 +195,7 @@ def test_damping_that_is_the_same_throughout_has_no_peak(tmp_path, damping):
     writer.close("done", "stop value reached")
     run = Run(tmp_path)
     figure = backbone.draw([run.analyses["mode"]])
-    (name,) = [text for text in texts(figure) if text.startswith("CNM")]
+    (name,) = [text for text in legend_texts(figure) if text.startswith("CNM")]
     assert name == f"CNM, H = 1: ζ {100 * damping:.3g} % throughout"
     assert not any(line.get_marker() == style.PEAK["marker"] for axes in figure.axes for line in axes.get_lines())
     (told,) = overviews(tmp_path)[1]
@@ -237,7 +233,7 @@ def test_the_close_up_of_the_folds_covers_no_point(tmp_path, late):
 
 def test_backbone_under_negative_damping_marks_stable_and_unstable_limit_cycles(run):
     figure = backbone.draw([run.analyses["flutter"]])
-    assert {"limit cycle, stable in its own amplitude", "limit cycle, unstable"} <= set(texts(figure))
+    assert {"limit cycle, stable in its own amplitude", "limit cycle, unstable"} <= set(legend_texts(figure))
     stable, unstable = run.analyses["flutter"].mode_curve().crossings()
     width = np.sqrt(np.log(2.0))
     assert stable.amplitude == pytest.approx(0.2 * np.exp(-width), rel=1e-2) and stable.stable
@@ -252,7 +248,7 @@ def test_trajectories_and_phase_planes_are_closed_and_named_by_amplitude(run):
         for line in left.get_lines():
             x, y = line.get_data()
             assert (x[0], y[0]) == pytest.approx((x[-1], y[-1]))
-        assert texts(figure)[0] == "0.0317 m"
+        assert legend_texts(figure)[0] == "0.0317 m"
 
 
 def test_velocity_of_a_phase_plane_includes_the_decay_for_cnm_only(run):
@@ -275,20 +271,20 @@ def test_response_has_a_curve_per_level_backbones_and_time_points(run):
     modes = [run.analyses["mode"], run.analyses["mode_epmc"]]
     figure = forced.draw(run.analyses["forced"], modes, run.table("forced_time"))
     names = ["level 1", "level 2", "backbone, CNM", "backbone, EPMC", "time integration"]
-    assert texts(figure) == [*names, "computed points", "estimated error, at most 0.1 mm"]
+    assert legend_texts(figure) == [*names, "computed points", "estimated error, at most 0.1 mm"]
     assert dashes(figure.axes[0]).count("--") == 1
 
 
 def test_free_decay_has_the_mode_and_a_set_of_circles_per_start(run):
     (figure,) = [figure for _, figure in free_decay.figures(run)]
     names = ["mode, CNM", "cycles of the decay from 1 m", "cycles of the decay from 0.3 m"]
-    assert texts(figure) == [*names, "computed points"]
+    assert legend_texts(figure) == [*names, "computed points"]
     assert len(figure.axes[0].get_lines()[2].get_xdata()) == 5
 
 
 def test_limit_cycles_show_every_start_and_both_predictions(run):
     figures = dict(limit_cycles.figures(run))
-    names = texts(figures["limit_cycle_envelopes"])
+    names = legend_texts(figures["limit_cycle_envelopes"])
     assert names[:3] == ["low start, a = 0.05 m", "intermediate start, a = 0.3 m", "high start, a = 1.5 m"]
     assert [name.split(",")[1] for name in names[3:]] == [" stable in its own amplitude", " unstable"]
     assert [text.get_text() for text in figures["limit_cycle_envelopes"].axes[0].texts] == ["diverges, stopped"]

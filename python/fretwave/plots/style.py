@@ -185,7 +185,8 @@ def legend_outside(figure: Figure, axes: Axes, columns: int = 4, title: str | No
     entries = _entries(axes)
     for number in range(columns, 0, -1):
         look = {"loc": "upper center", "ncols": number, "title": title}
-        drawn = figure.legend(list(entries.values()), list(entries), **look)
+        names = [name for k in range(number) for name in list(entries)[k::number]]  # filled by column, read by row
+        drawn = figure.legend([entries[name] for name in names], names, **look)
         size = drawn.get_window_extent(figure.canvas.get_renderer())
         if size.width <= figure.bbox.width or number == 1:
             break
