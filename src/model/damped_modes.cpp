@@ -168,6 +168,7 @@ std::vector<LinearMode> modes_of(Model const& model, int count, std::vector<Phas
   for (auto const& parts : {std::cref(stiffness), std::cref(damping)})
     matrices.push_back(real_form(parts.get(), model.theta(), travelling));
   matrices.push_back(real_form(required(model, 2, "mass"), model.theta(), travelling));
+  cancel(matrices[0], stiffness);
   if (!matrices[1]) {
     check(MatDuplicate(matrices[0], MAT_DO_NOT_COPY_VALUES, matrices[1].out()));
     check(MatZeroEntries(matrices[1]));

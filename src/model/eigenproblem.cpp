@@ -1,5 +1,6 @@
 #include "model/eigenproblem.h"
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 
@@ -23,8 +24,8 @@ MatHandle congruence(Mat A, Vec diagonal, Mat B) {
 
 constexpr PetscInt small = 500;
 
-/// Entries of any sign and size, the same on any ranks, over the root of the matrix' diagonal.
-VecHandle scrambled_rows(Mat A, int stream) {
+/// Entries of any sign and size, the same on any ranks; `by_rows` over the root of the matrix' diagonal.
+VecHandle scrambled_rows(Mat A, int stream, bool by_rows) {
   VecHandle rows;
   PetscInt first;
   double largest;
@@ -35,10 +36,16 @@ VecHandle scrambled_rows(Mat A, int stream) {
   WriteArray entries(rows);
   for (PetscInt i = 0; i < local_size(rows); ++i) {
     const auto bits = scrambled(2 * std::uint64_t(first + i) + std::uint64_t(stream));
-    const double stiffness = entries[i] != 0 ? std::abs(entries[i]) : largest;
+    const double own = entries[i] != 0 ? std::abs(entries[i]) : largest, stiffness = by_rows ? own : largest;
     entries[i] = (double(bits >> 11) * 0x1p-53 - 0.5) / std::sqrt(stiffness > 0 ? stiffness : 1);
   }
   return rows;
+}
+
+/// Of the sector itself.
+Mat own_term(std::vector<PhasedMap> const& terms) {
+  const auto own = std::ranges::find(terms, 0, &PhasedMap::phase);
+  return own != terms.end() ? own->B : terms.front().B;
 }
 
 }  // namespace
@@ -80,23 +87,27 @@ bool symmetric(Mat A) {
 
 bool hermitian(std::vector<PhasedMap> const& terms, double theta) {
   constexpr double rounding = 1e-10;
-  const VecHandle x = scrambled_rows(terms[0].B, 0), y = scrambled_rows(terms[0].B, 1), product = like(x);
-  double size = 0;
-  const auto form = [&](Vec a, Mat A, Vec b) {
-    double absolute, sum;
-    check(MatMult(A, b, product));
-    check(VecPointwiseMult(product, a, product));
-    check(VecNorm(product, NORM_1, &absolute));
-    check(VecSum(product, &sum));
-    size += absolute;
-    return sum;
-  };
-  std::complex<double> difference = 0;
-  for (auto const& [A, phase] : terms) {
-    const auto turn = std::exp(-1i * (phase * theta));
-    difference += turn * form(x, A, y) - std::conj(turn) * form(y, A, x);
+  for (const bool by_rows : {true, false}) {
+    const VecHandle x = scrambled_rows(terms[0].B, 0, by_rows), y = scrambled_rows(terms[0].B, 1, by_rows),
+                    product = like(x);
+    double size = 0;
+    const auto form = [&](Vec a, Mat A, Vec b) {
+      double absolute, sum;
+      check(MatMult(A, b, product));
+      check(VecPointwiseMult(product, a, product));
+      check(VecNorm(product, NORM_1, &absolute));
+      check(VecSum(product, &sum));
+      size += absolute;
+      return sum;
+    };
+    std::complex<double> difference = 0;
+    for (auto const& [A, phase] : terms) {
+      const auto turn = std::exp(-1i * (phase * theta));
+      difference += turn * form(x, A, y) - std::conj(turn) * form(y, A, x);
+    }
+    if (std::abs(difference) <= rounding * size) return true;
   }
-  return std::abs(difference) <= rounding * size;
+  return false;
 }
 
 Operators operators(MPI_Comm comm, std::vector<MatHandle> matrices) {
@@ -143,7 +154,15 @@ double trace_ratio(Mat K, Mat M) {
 
 double scale_of(Mat K, Mat M, std::vector<PhasedMap> const& terms) {
   const double scale = trace_ratio(K, M);
-  return scale != 0 ? scale : trace_ratio(terms.front().B, M);
+  return scale != 0 ? scale : trace_ratio(own_term(terms), M);
+}
+
+void cancel(Mat K, std::vector<PhasedMap> const& terms) {
+  constexpr double rounding = 1e-14;
+  double size, own;
+  check(MatNorm(K, NORM_INFINITY, &size));
+  check(MatNorm(own_term(terms), NORM_INFINITY, &own));
+  if (size <= rounding * own) check(MatZeroEntries(K));
 }
 
 VecHandle balance(Mat K, Mat M) {

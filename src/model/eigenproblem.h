@@ -17,8 +17,8 @@ std::vector<PhasedMap> required(Model const&, int order, char const* name);
 /// leaves unsymmetric where entries cancel.) Collective.
 bool symmetric(Mat);
 
-/// Whether sum_k A_k e^{-i k theta} is Hermitian, but for rounding, told from x^H A y = (y^H A x)* of two
-/// vectors of scrambled entries that weigh all dofs alike: two products a term, no copy of a large matrix.
+/// Whether sum_k A_k e^{-i k theta} is Hermitian, but for what rounding leaves of its largest entries or row
+/// by row, told from x^H A y = (y^H A x)* of two vectors of scrambled entries: no copy of a large matrix.
 /// Collective.
 bool hermitian(std::vector<PhasedMap> const& terms, double theta);
 
@@ -46,6 +46,8 @@ void take_shape(Model const&, Operators const&, Vec re, Vec im, LinearMode&);
 double trace_ratio(Mat K, Mat M);
 /// The same; of the sector's own term where the terms cancel in a wave. Collective.
 double scale_of(Mat K, Mat M, std::vector<PhasedMap> const& terms);
+/// Makes K zero where it is but the rounding of terms that cancel in a wave. Collective.
+void cancel(Mat K, std::vector<PhasedMap> const& terms);
 
 /// Scales of the dofs by which no mass outweighs the others: what rigid contact holds it holds but for
 /// rounding, which a mass 1e12 times the others' lets them feel. Collective.

@@ -69,6 +69,7 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
   }
   const bool constrained = stiff && stiff->rows() > 0;
   MatHandle K = real_form(stiffness, model.theta(), travelling);
+  cancel(K, stiffness);
   VecHandle scales;
   if (constrained) {
     scales = balance(K, M);

@@ -256,6 +256,19 @@ def test_circulatory_forces_make_undamped_modes_flutter(comm, circulation, state
     exact = state_eigenvalues(M3, 0.0 * C3, K)
     assert (max(v.real for v in exact) > 0.1) == (circulation > 10)
     np.testing.assert_allclose(sorted(values, key=ascending), sorted(exact, key=ascending), rtol=1e-8)
+    for mode, value in zip(modes, values):
+        phi = mode.shape + 1j * mode.imaginary
+        np.testing.assert_allclose(K @ phi + value**2 * M3 @ phi, 0.0, atol=1e-8)
+        assert np.vdot(phi, M3 @ phi) == pytest.approx(1.0, rel=SOLVED)
+
+
+def test_what_rounding_leaves_of_symmetry_is_none(comm):
+    """Reduced matrices have it of their largest entries: their soft rows are off by far more of themselves."""
+    K = np.array([[1e9, 0.0, 0.0], [0.0, 200.0, -100.0], [0.0, -100.0 * (1 + 1e-9), 200.0]])
+    modes = fw.linear_modes(fw.Model(4.0 * np.eye(3), K, comm=comm), 2, "free")
+    assert [mode.omega for mode in modes] == pytest.approx([5.0, np.sqrt(75.0)], rel=1e-8)
+    for mode in modes:
+        assert not mode.imaginary.any() and 4 * mode.shape @ mode.shape == pytest.approx(1.0, rel=SOLVED)
 
 
 def ascending(value):

@@ -138,3 +138,14 @@ def test_a_ring_of_masses_turns_freely(comm, state):
             assert not found, "a motion that does not oscillate"
         else:
             assert found == pytest.approx([2 * np.sqrt(k / m) * np.sin(np.pi * d / sectors)], rel=SOLVED)
+
+
+@pytest.mark.parametrize("state", ["free", "stuck", "linearised"])
+@pytest.mark.parametrize("springs", [(0.1, 0.2), (0.1, 0.7), (0.3, 0.6)])
+def test_terms_cancel_but_for_rounding(comm, state, springs):
+    """Springs to the next and to the second next mass: 2 (0.1 + 0.2) - 0.2 - 0.4 is 5e-17."""
+    one, two = springs
+    parts = {1: -one, 0: 2 * (one + two), -1: -one, 2: -two, -2: -two}
+    K = {k: np.array([[value]]) for k, value in parts.items()}
+    model = fw.Model(np.eye(1), K, comm=comm, sectors=7, nodal_diameter=0)
+    assert [mode.omega for mode in fw.linear_modes(model, 1, state)] == ([] if state == "linearised" else [0.0])

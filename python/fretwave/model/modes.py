@@ -79,8 +79,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     Stuck and free modes below the last (nearer than the farthest) are counted by the negative pivots of K - omega^2 M
     (Sylvester), so that no copy of a double mode and no member of a family is left out.
 
-    A stiffness that is not symmetric (circulatory forces) has modes without damping that may flutter, beta != 0;
-    their shapes are of unit length.
+    A stiffness that is not symmetric (circulatory forces) has modes without damping that may flutter, beta != 0.
 
     Of one sector: the waves of the model's nodal diameter (`fretwave.cyclic.sector` says which way they run).
     """
@@ -103,6 +102,8 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
             part.destroy()
     if model.core.travelling:
         shapes = [_aligned(phi) for phi in shapes]
+    elif contact != "linearised":
+        shapes = [_of_unit_mass(model, _aligned(phi)) if np.any(phi.imag) else phi for phi in shapes]
     return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]
 
 
@@ -151,6 +152,12 @@ def _check_factor(model: Model) -> None:
             expected=f"at most {size(available)}",
             fix="take one sector, a coarser mesh or a reduction",
         )
+
+
+def _of_unit_mass(model: Model, phi: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+    """phi^H M phi = 1. Collective."""
+    mass = sum(part @ model.inertia(part) for part in (phi.real, phi.imag))
+    return np.asarray(phi / np.sqrt(mass))
 
 
 def _aligned(phi: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
