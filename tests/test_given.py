@@ -119,7 +119,8 @@ def worn() -> fw.Branch:
 @pytest.mark.parametrize(
     "changed",
     [
-        *({name: value} for name in ("coefficient", "cycles", "cycle_unit") for value in (0.0, -1.0, NAN)),
+        *({name: value} for name in ("cycles", "cycle_unit") for value in (0.0, -1.0, NAN)),
+        *({"coefficient": value} for value in (-1.0, NAN)),
         *({"areas": areas} for areas in ({}, *({"contact": a} for a in ([0.0], [-1.0], [1.0, 1.0], 1.0, [NAN])))),
         {"amplitude": NAN},
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers as numbers_abc
 import operator
 
 import numpy as np
@@ -51,6 +52,16 @@ def not_negative(name: str, value: object) -> float:
     return float(numbers(name, value, least=0.0))
 
 
+def positive_or_infinite(name: str, value: object) -> float:
+    """A number above zero, or infinity where there is no bound.
+
+    Raises
+    ------
+    InputError
+    """
+    return np.inf if isinstance(value, float) and value == np.inf else positive(name, value)
+
+
 def numbers(
     name: str, values: object, shape: tuple[int, ...] = (), above: float = -np.inf, least: float = -np.inf
 ) -> Array:
@@ -60,7 +71,7 @@ def numbers(
     ------
     InputError
     """
-    found = np.asarray(values)
+    found = _array(values)
     real = found.dtype.kind in "biuf" and found.shape == shape and bool(np.isfinite(found).all())
     if not real or not ((found > above) & (found >= least)).all():
         bound = f", > {above:g}" if above > -np.inf else f", >= {least:g}" if least > -np.inf else ""
@@ -69,3 +80,13 @@ def numbers(
         fix = "give such numbers" if shape else "give such a number"
         raise InputError("a number cannot be used", name, shown, wanted, fix)
     return found.astype(float)
+
+
+def _array(values: object) -> Array:
+    """Also of rows of different lengths, as no numbers, and of Python's fractions."""
+    try:
+        found = np.asarray(values)
+        fractions = found.dtype == object and all(isinstance(value, numbers_abc.Real) for value in found.flat)
+        return found.astype(float) if fractions else found
+    except ValueError:
+        return np.array(None)

@@ -222,17 +222,20 @@ class LinearAnalysis(AnalysisSection):
         writer = context.writer(columns, ["1c", "1s"], samples=SAMPLES, sectors=sectors, engine_orders=orders)
         rows: list[dict[str, Any]] = []
         found: dict[str, list[LinearMode]] = {}
-        waves: dict[tuple[Any, ...], list[LinearMode]] = {}
+        C, shift = context.case.damped(self.dampers).C, 0.0
         for diameters in self.waves(sectors):
             for speed in self.speeds():
+                wave: dict[str, list[LinearMode]] = {}
                 for row, mode in modes_of_wave(context, diameters, speed):
-                    waves.setdefault((diameters, speed, row["contact"]), []).append(mode)
+                    wave.setdefault(row["contact"], []).append(mode)
                     rows.append({"point": writer.rows, **row, **around_wheel(context, mode)})
                     if speed == self.speeds()[-1]:
                         found.setdefault(row["contact"], []).append(mode)
                     writer.append(rows[-1], np.column_stack([mode.shape, -mode.imaginary]))
+                theta = sector_phase(context.case, diameters)
+                shift = max([shift, *(gyroscopic_shift(modes, C, theta) for modes in wave.values())])
         summary = [*_summary(context, rows), *_meet(context, rows, sectors), *_amplify(context, found)]
-        summary += gyroscopic_lines(self.name, _gyroscopic(context, waves))
+        summary += gyroscopic_lines(self.name, shift)
         writer.close("done", "all modes")
         return Outcome(writer.rows, "all modes", True, summary)
 
@@ -244,13 +247,6 @@ def _amplify(context: AnalysisContext[LinearAnalysis], found: Mapping[str, Seque
     rows = amplifications(context, found)
     context.write_table("amplification", {name: [row[name] for row in rows] for name in AMPLIFICATION})
     return amplification_lines(context.name, rows, context.wheel.sectors)
-
-
-def _gyroscopic(context: AnalysisContext[LinearAnalysis], waves: Mapping[tuple[Any, ...], list[LinearMode]]) -> float:
-    """Largest share of a frequency that the skew part of C moves, of all waves, speeds and limits."""
-    C = context.case.damped(context.analysis.dampers).C
-    shifts = (gyroscopic_shift(modes, C, sector_phase(context.case, key[0])) for key, modes in waves.items())
-    return max(shifts, default=0.0)
 
 
 def _summary(context: AnalysisContext[LinearAnalysis], rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -71,7 +71,7 @@ class Aerodynamics:
         if not 0 < self.omega < math.inf:
             raise InputError("influence coefficients need a frequency", None, self.omega, "> 0 rad/s", "give omega")
         for k, L in self.influence.items():
-            numbers(f"influence coefficient {k}", [L.real, L.imag], (2,))
+            numbers(f"influence coefficient {k}", [getattr(L, "real", L), getattr(L, "imag", 0.0)], (2,))
 
     def __repr__(self) -> str:
         acts = "modal" if self.dof is None else f"on dof {self.dof}"

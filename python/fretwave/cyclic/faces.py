@@ -65,7 +65,7 @@ def match_faces(
     """
     points, low, high = np.asarray(xyz, dtype=float), np.asarray(low, dtype=np.intp), np.asarray(high, dtype=np.intp)
     check_number(sectors)
-    for node in (nodes[np.argmax(np.abs(nodes - len(points) / 2))] for nodes in (low, high) if len(nodes)):
+    for node in (end for nodes in (low, high) if len(nodes) for end in (nodes.min(), nodes.max())):
         place("node", node, len(points))
     called = np.arange(len(points)) if numbers is None else np.asarray(numbers)
     _check_given(points, low, high, axis, called)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Array, Complex
 from ..errors import InputError
-from ..given import not_negative, place
+from ..given import not_negative, place, whole
 from ..model.modes import LinearMode
 from ..model.sectors import check_number
 from ..model.wheel_matrix import Matrix, WheelMatrix
@@ -24,7 +24,6 @@ from .sector import Sector, wave_mode
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
 ALIKE = 1e-3
 #: Of the generator.
-MOST_SEEDS = 2**63
 
 
 def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tuple[LinearMode, Optional[Complex]]:
@@ -103,8 +102,10 @@ def deviations(sectors: int, standard_deviation: float, seed: int = 1) -> Array:
         Fewer than two sectors, a negative standard deviation or seed.
     """
     check_number(sectors)
-    standard_deviation, seed = not_negative("standard_deviation", standard_deviation), place("seed", seed, MOST_SEEDS)
-    drawn = np.random.Generator(np.random.PCG64(seed)).standard_normal(sectors)
+    standard_deviation, number = not_negative("standard_deviation", standard_deviation), whole(seed)
+    if number is None or number < 0:
+        raise InputError("there is no such seed", None, repr(seed), "a whole number >= 0", "choose one of these")
+    drawn = np.random.Generator(np.random.PCG64(number)).standard_normal(sectors)
     return np.asarray(standard_deviation * (drawn - drawn.mean()))
 
 

@@ -127,7 +127,7 @@ def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, Sp
 def check_number(sectors: int) -> None:
     """A wheel has neighbours."""
     if (whole(sectors) or 0) < 2:
-        raise InputError("a wheel has two sectors or more", None, sectors, ">= 2", "give their number")
+        raise InputError("a wheel has two sectors or more", None, sectors, "a whole number >= 2", "give their number")
 
 
 def check_balanced(given: Term | None, name: str) -> None:

@@ -292,7 +292,7 @@ def _mode_words(row: Row) -> str:
 
 def _forced_words(row: Row) -> str:
     amplitude, frequency, place = row["largest_amplitude"], row["frequency_of_largest_amplitude"], ""
-    if math.isfinite(row.get("largest_blade_amplitude", math.nan)):  # of a wheel, where a blade has a peak
+    if row.get("largest_blade", math.nan) >= 0:  # of a wheel, where a blade has a peak
         amplitude, frequency = row["largest_blade_amplitude"], row["largest_blade_frequency_hz"]
         place = f" of sector {row['largest_blade']:.0f}"
     return f"largest {amplitude:.4g} {row['unit']}{place} at {frequency:.6g} Hz"

@@ -173,7 +173,10 @@ def _free(point: Point | None) -> None:
 
 def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, float, bool | None]:
     """Ends of the range, and whether the parameter grows at first (None: away from the nearer end)."""
-    ends = np.asarray(stop, dtype=float)
+    try:
+        ends = np.asarray(stop, dtype=float)
+    except (TypeError, ValueError):
+        ends = np.full(3, np.nan)
     if ends.shape not in ((), (2,)) or not (ends >= 0).all():
         expected, fix = "a number >= 0, or two: (low, high)", "say where the branch shall end"
         raise InputError("a branch cannot end there", "stop", repr(stop), expected, fix)

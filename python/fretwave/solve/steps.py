@@ -48,7 +48,8 @@ class StepControl:
         for name, value in vars(self).items():
             positive(f"step.{name}", value)
         if (whole(self.max_points) or 0) < 2:
-            raise InputError("a branch needs two points", "step.max_points", self.max_points, ">= 2", "allow more")
+            expected = "a whole number >= 2"
+            raise InputError("a branch needs two points", "step.max_points", self.max_points, expected, "allow more")
 
     def core(self) -> _core.StepControl:
         """The compiled twin."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import numbers, positive
+from ..given import numbers, positive, positive_or_infinite
 from ..model.model import Model
 from ..mpi.gather import on_all_ranks
 from .steps import TIME_TOLERANCE
@@ -95,11 +95,11 @@ class Transient:
         InputError
             An array does not fit the model, or a number is not above zero.
         """
-        for name, value in (("rtol", rtol), ("most_steps", most_steps)):
-            positive(name, value)
-        numbers("t_end, dt_out", [t_end, dt_out], (2,))
-        if not limit > 0:
-            raise InputError("a motion cannot be so small", "limit", limit, "> 0", "give a larger limit, or none")
+        for name, value in (("t_end", t_end), ("dt_out", dt_out)):
+            numbers(name, value)
+        positive("rtol", rtol)
+        for name, value in (("limit", limit), ("most_steps", most_steps)):
+            positive_or_infinite(name, value)
         t, x, v, steps, implicit, finished, reason = self._core.run(
             self.model.vector(x0), self.model.vector(v0), t_end, dt_out, rtol, limit, float(most_steps)
         )

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import numbers, positive
+from ..given import not_negative, numbers
 from ..hb.harmonic_problem import HarmonicProblem
 from ..model.law_info import Role
 from ..model.laws import law_like
@@ -68,11 +68,11 @@ class WornMode(Destroyable):
     Raises
     ------
     InputError
-        There is no such contact, or it cannot wear; a coefficient or an area is no number above zero.
+        There is no such contact, or it cannot wear; the coefficient is below zero, or an area no number above.
     """
 
     def __init__(self, problem: HarmonicProblem, coefficient: float, areas: Mapping[str, Array]) -> None:
-        self.problem, self.model, self.coefficient = problem, problem.model, positive("coefficient", coefficient)
+        self.problem, self.model, self.coefficient = problem, problem.model, not_negative("coefficient", coefficient)
         names = [contact.name for contact in self.model.contacts]
         for name in areas:
             self._check(name, names)
