@@ -12,11 +12,14 @@ import scipy.sparse
 from fretwave.case.load import Case, changed_keys, load_case
 from fretwave.case.toml.locate import Locator
 from fretwave.errors import CaseErrors, FretwaveError, InputError
+from fretwave.model.structure import Structure
+from fretwave.results.model_file import write_model
 
 pytestmark = pytest.mark.ranks(1)
 
 CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
 TEXT = CASE.read_text(encoding="utf-8")
+LINEAR = '[[analysis]]\nname = "a"\ntype = "linear"\n'
 
 
 @pytest.fixture
@@ -360,3 +363,23 @@ x = "]"
     assert {path: locate.line(path) for path in expected} == expected
     assert ("not",) not in locate
     assert locate.line(("item", 1, "missing")) == 11
+
+
+def test_a_reader_that_knows_what_is_wrong_is_told_once(tmp_path: Path) -> None:
+    """Its own error stood inside another: two places and two ways to mend it."""
+    (tmp_path / "K.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n")
+    for given in ('K = "K.mtx"', 'K = [[1.0]]\nat_speed = { 30 = "K.mtx" }'):
+        (tmp_path / "case.toml").write_text(f"[model]\nM = [[1.0]]\n{given}\n{LINEAR}")
+        (problem,) = problems(tmp_path / "case.toml")
+        assert problem.what == "the matrix has places without values" and "K.mtx: pattern" in str(problem.measured)
+        assert str(problem).count("fix:") == str(problem).count("where:") == 1 and "case.toml:" in str(problem.where)
+
+
+def test_a_model_file_in_place_of_a_matrix(tmp_path: Path) -> None:
+    """It was to be imported into itself."""
+    eye = scipy.sparse.identity(1, format="csr")
+    write_model(tmp_path / "good.h5", Structure(eye, eye))
+    (tmp_path / "case.toml").write_text(f'[model]\nM = "good.h5"\nK = [[1.0]]\n{LINEAR}')
+    (problem,) = problems(tmp_path / "case.toml")
+    assert problem.fix is not None and problem.fix.startswith('file = "') and "good.h5" in problem.fix
+    assert "import" not in problem.fix

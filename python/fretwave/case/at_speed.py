@@ -52,7 +52,7 @@ def with_speeds(
     squares, changes = [], []
     for text, given in section.at_speed.items():
         key = ("model", "at_speed", text)
-        square, read = square_of(text, key, source, found, EXAMPLE), _stiffness(given, key, structure, source, found)
+        square, read = square_of(text, key, source, found, EXAMPLE), _stiffness(given, key, structure, source, notes, found)
         if square is not None and read is not None:
             squares.append(square)
             changes.append(read[0] - at_rest)
@@ -125,7 +125,7 @@ def square_of(text: str, key: KeyPath, source: Source, found: Found, example: st
 
 
 def _stiffness(
-    given: Matrix, key: KeyPath, structure: Structure, source: Source, found: Found
+    given: Matrix, key: KeyPath, structure: Structure, source: Source, notes: list[str], found: Found
 ) -> tuple[Sparse, Any] | None:
     """K at a speed, on the dofs of the model at rest, and what identifies it; None when something is wrong."""
     digest: Any
@@ -136,7 +136,7 @@ def _stiffness(
         other, digest = read
         complaint, K = _other_model(structure, other), sp.csr_matrix(other.own("K"))
     else:
-        loaded = matrices.load("K", given, source, found, key)
+        loaded = matrices.load("K", given, source, notes, found, key)
         if loaded is None:
             return None
         K, digest = loaded[0], loaded[2] or given

@@ -167,7 +167,7 @@ def _structure(
     found: list[FretwaveError],
 ) -> tuple[Structure | None, Mapping[str, str], Mapping[str, Any]]:
     """The model in the case's units and at its speed, the places of its parts, and what tells it by address."""
-    given = load_origin(section, source, found) if section else None
+    given = load_origin(section, source, notes, found) if section else None
     structure, places, identity = given or (None, {}, {})
     if section and structure:
         source.dof_fix = partial(missing_dof, structure)

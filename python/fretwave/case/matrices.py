@@ -10,27 +10,29 @@ import numpy as np
 import scipy.sparse
 
 from ..errors import FretwaveError, InputError
-from ..files.compressed import check_compressed
 from ..model.checks import NAMES
 from ..model.sectors import Sparse
+from ..results.model_file import read_sources
 from ..texts import display, is_there, nearest, shortened
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 
 #: Endings of files that a case reads without a plug-in.
 READ = (".npz", ".mtx")
+MODEL_FILE = ".h5"
 
 
 def load(
     letter: str,
     given: Union[str, list[list[float]]],
     source: Source,
+    notes: list[str],
     found: list[FretwaveError],
     key: KeyPath | None = None,
 ) -> tuple[Sparse, str, str] | None:
     """A matrix of ``[model]``, square with finite entries, with its place and its hash, "" for rows.
 
-    None (and an entry in `found`) when something is wrong.
+    None (and an entry in `found`) when something is wrong; what only looks so is added to the notes.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def load(
     try:
         if isinstance(given, str):
             path = source.path.parent / given
-            values, place = _read(path, letter, where), f"{where}, {display(path)}"
+            values, place = _read(path, letter, where, key, notes), f"{where}, {display(path)}"
             digest = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
         else:
             values, place = _from_rows(letter, given, source, key), where
@@ -66,7 +68,7 @@ def _from_rows(letter: str, rows: list[list[float]], source: Source, key: KeyPat
     return scipy.sparse.csr_matrix(np.array(rows, dtype=float))
 
 
-def _read(path: Path, letter: str, where: str) -> Sparse:
+def _read(path: Path, letter: str, where: str, key: KeyPath, notes: list[str]) -> Sparse:
     if not is_there(path):
         folder = path.parent
         names = sorted(entry.name for entry in folder.iterdir()) if is_there(folder) and folder.is_dir() else []
@@ -78,17 +80,20 @@ def _read(path: Path, letter: str, where: str) -> Sparse:
             fix=nearest(path.name, names) or "check the path",
         )
     try:
-        values = _read_known(path, letter)
+        values = _read_known(path, letter, notes)
         sparse = scipy.sparse.csr_matrix(values)
         if not (np.issubdtype(sparse.dtype, np.number) or sparse.dtype == bool):
             raise ValueError(f"entries of type {sparse.dtype}")
+    except InputError as error:
+        measured = f"{display(path)}: {error.measured or error.where}"
+        raise InputError(error.what, where, measured, error.expected, error.fix) from None
     except Exception as error:  # whatever the readers raise on a damaged file
         raise InputError(
             f"the file of the {NAMES[letter]} cannot be read",
             where=where,
             measured=f"{display(path)}: {shortened(str(error) or type(error).__name__)}",
             expected=f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx",
-            fix=_another_way(path, letter),
+            fix=_another_way(path, letter, key),
         ) from None
     if np.iscomplexobj(sparse):
         raise InputError(
@@ -100,45 +105,57 @@ def _read(path: Path, letter: str, where: str) -> Sparse:
     return sparse.astype(float)
 
 
-def _another_way(path: Path, letter: str) -> str:
+def _another_way(path: Path, letter: str, key: KeyPath) -> str:
     """To the matrix of a file that a case does not read."""
     from ..importers.formats import format_of
 
+    name = key[-1] if len(key) > 2 else "file"
+    if name == "file" and _is_model(path):
+        return f'{name} = "{display(path)}" alone, in place of M, K and C: it is a model file'
     written = f"write it with scipy.sparse.save_npz('{path.with_suffix('.npz').name}', {letter})"
     if path.suffix.lower() in READ or not path.is_file() or format_of(path) is None:
         return written
-    return f'`fretwave import` brings it into a model file, file = "{display(path.with_suffix(".h5"))}"; or {written}'
+    model = display(path.with_suffix(MODEL_FILE))
+    return f'`fretwave import` brings it into a model file, {name} = "{model}"; or {written}'
 
 
-def _read_known(path: Path, letter: str) -> Any:
+def _is_model(path: Path) -> bool:
+    try:
+        read_sources(path)
+    except InputError:
+        return False
+    return True
+
+
+def _read_known(path: Path, letter: str, notes: list[str]) -> Any:
     from ..importers import formats, matrix_market
 
     if (format := formats.registered(path)) is not None:
-        return _as_given(format.read(path, letter, None), letter)
+        return _as_given(format.read(path, letter, None), letter, notes)
     if path.suffix.lower() == ".mtx":
-        return _as_given(matrix_market.read(path), letter)
+        return _as_given(matrix_market.read(path), letter, notes)
     if path.suffix.lower() != ".npz":
         raise ValueError(f"unknown file type '{path.suffix}'")
     with np.load(path) as archive:
         if "format" not in archive.files:
             return archive[letter]
-    matrix = scipy.sparse.load_npz(path)
-    check_compressed(matrix)
-    return matrix
+    return _as_given(scipy.sparse.load_npz(path), letter, notes, path)
 
 
-def _as_given(found: object, letter: str) -> Any:
-    """The matrix of a registered reader; what has to be put in order is the importer's."""
+def _as_given(found: Any, letter: str, notes: list[str], path: Path | None = None) -> Any:
+    """The matrix of a reader, whose entries add up; what has to be put in order is the importer's."""
     from ..importers.entries import Entries
     from ..importers.repeated import check_once
 
+    if path is not None:
+        found = Entries.of(found, display(path), "SciPy sparse archive")
     if not isinstance(found, Entries):
         return found
     if found.labels is not None or found.held is not None or found.half:
         raise ValueError("it numbers its dofs by nodes; bring it into a model file with `fretwave import`")
     matrix = scipy.sparse.csr_matrix((found.values, (found.rows, found.columns)), shape=found.shape)
     if matrix.nnz < len(found.values):
-        check_once(letter, found)
+        notes += check_once(letter, found)
     return matrix
 
 

@@ -26,7 +26,7 @@ from .toml.validation import missing_key
 Given = Tuple[Structure, Mapping[str, str], Mapping[str, Any]]
 
 
-def load_origin(section: ModelSection, source: Source, found: Found) -> Given | None:
+def load_origin(section: ModelSection, source: Source, notes: list[str], found: Found) -> Given | None:
     """The model of ``[model]``, from the one source that it names; None when something is wrong."""
     ways = {"builder": section.builder is not None, "file": section.file is not None}
     given = [way for way, is_given in ways.items() if is_given]
@@ -45,8 +45,9 @@ def load_origin(section: ModelSection, source: Source, found: Found) -> Given | 
     if section.options and section.builder is None:
         problem = "there are options but no builder"
         found.append(InputError(problem, source.where(("model", "options")), fix='add `builder = "model.py"`'))
-    readers = {"builder": _from_builder, "file": _from_file}
-    return readers.get(given[0] if given else "", _from_matrices)(section, source, found)
+    if not given:
+        return _from_matrices(section, source, notes, found)
+    return {"builder": _from_builder, "file": _from_file}[given[0]](section, source, found)
 
 
 def _from_builder(section: ModelSection, source: Source, found: Found) -> Given | None:
@@ -84,7 +85,7 @@ def read_file(file: str, key: KeyPath, source: Source, found: Found) -> tuple[St
     return None
 
 
-def _from_matrices(section: ModelSection, source: Source, found: Found) -> Given | None:
+def _from_matrices(section: ModelSection, source: Source, notes: list[str], found: Found) -> Given | None:
     loaded: dict[str, Sparse] = {}
     places: dict[str, str] = {}
     resolved: dict[str, Any] = {}
@@ -94,7 +95,7 @@ def _from_matrices(section: ModelSection, source: Source, found: Found) -> Given
             if letter != "C":
                 found.append(missing_key(ModelSection, source, ("model",), letter))
             continue
-        matrix = matrices.load(letter, given, source, found)
+        matrix = matrices.load(letter, given, source, notes, found)
         if matrix is not None:
             loaded[letter], places[letter], digest = matrix
             resolved[f"model.{letter}"] = digest or given

@@ -135,7 +135,7 @@ def assemble(given: dict[str, Entries], symmetric: str = "auto") -> Assembled:
     for letter, entries in given.items():
         matrix = sp.csr_matrix((entries.values.astype(float), (entries.rows, entries.columns)), shape=entries.shape)
         if matrix.nnz < len(entries.values):
-            check_once(letter, entries)
+            found.warnings += check_once(letter, entries)
         matrix.eliminate_zeros()
         found.matrices[letter] = matrix
     found.given_size = found.size

@@ -3,15 +3,17 @@
 Of U + U^T, U the upper triangle with the diagonal, the diagonal is doubled. A body that moves as a whole feels no
 force: sum_j K_ij = 0 over the dofs along one direction, apart from held nodes. Doubled, that is half of the diagonal.
 
-Entries at one place add up, as those of unassembled elements should. In these some place of two nodes of one element
-stands once, and finite-element codes write each place of an assembled matrix once.
+Entries at one place add up, as those of unassembled elements should, and equal springs look like either slip: in a
+chain each mass has two, two in parallel make every place twice. Only codes that assemble write each place once. No
+matrix was mirrored whose own diagonal, half of what the entries add up to, would leave it negative for a motion.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..errors import InputError
@@ -20,20 +22,22 @@ from ..model.structure import Structure
 if TYPE_CHECKING:
     from .entries import Entries
 
-#: Formats of codes that write assembled matrices, as their kinds begin.
-ASSEMBLED = ("CalculiX", "Abaqus")
+#: Formats of codes that write assembled matrices, as their kinds begin; any program writes triplets without nodes.
+ASSEMBLED = ("CalculiX", "Abaqus, matrix input")
+#: Sum of a matrix's entries over that of their sizes that is rounding.
+ROUND = 1e-9
 #: Share of the rows that say that the diagonal is doubled, how closely, and the entries in a row that make it a mesh:
 #: in a chain a row's sum may be half its diagonal beside what is held.
 HALF, CLOSE, MESH = 0.5, 1e-6, 20
 
 
-def check_once(letter: str, entries: Entries) -> None:
-    """No place of an assembled matrix stands twice; in others not all beside the diagonal, or all on it alone, do.
+def check_once(letter: str, entries: Entries) -> list[str]:
+    """No place of an assembled matrix stands twice; a warning of others that look as if they were doubled.
 
     Raises
     ------
     InputError
-        They do.
+        An assembled one does.
     """
     order = np.lexsort((entries.values, entries.columns, entries.rows))
     rows, columns, values = entries.rows[order], entries.columns[order], entries.values[order]
@@ -41,16 +45,24 @@ def check_once(letter: str, entries: Entries) -> None:
     count = np.diff(np.append(starts, len(rows)))
     alike = (count > 1) & (values[starts] == values[starts + count - 1])
     beside = rows[starts] != columns[starts]
-    mirrored = beside.any() and alike[~beside].all() and (~beside).any() and (count[beside] == 1).all()
     assembled = entries.kind.startswith(ASSEMBLED)
-    if not (assembled or mirrored or (beside.any() and alike[beside].all())):
-        return
+    mirrored = beside.any() and alike[~beside].all() and (~beside).any() and (count[beside] == 1).all()
+    doubled = beside.any() and alike[beside].all()
+    if not (assembled or doubled or (mirrored and _may_be_mirrored(values[starts]))):
+        return []
     first = int(starts[np.argmax(count > 1)])
     measured = f"{int((count > 1).sum())} of {len(count)} places, the first {letter}[{rows[first]}][{columns[first]}]"
-    fix = "write each entry once: the file may hold the matrix twice, or both triangles where it says one"
-    if mirrored and not assembled:
-        fix = "write the diagonal once: A + A.T - diag(A) of a triangle A"
-    raise InputError(f"entries of {letter} stand twice", entries.where, measured, "each place once", fix)
+    if assembled:
+        fix = "write each entry once: the file may hold the matrix twice, or both triangles where it says one"
+        raise InputError(f"entries of {letter} stand twice", entries.where, measured, "each place once", fix)
+    fix = "the diagonal once: A + A.T - diag(A) of a triangle A" if mirrored else "each entry once"
+    said = f"entries of {letter} stand twice and are added up ({entries.where}: {measured}): if they are elements'"
+    return [f"{said}, write A.tocsr() to be rid of this warning; else write {fix}"]
+
+
+def _may_be_mirrored(once: npt.NDArray[Any]) -> bool:
+    """Entries of the matrix whose diagonal was not doubled: not negative for a motion of all dofs alike."""
+    return bool(once.sum() >= -ROUND * abs(once).sum())
 
 
 def check_diagonal(model: Structure, where: str) -> None:
