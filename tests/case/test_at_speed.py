@@ -117,7 +117,24 @@ def test_what_is_no_stiffness_at_a_speed_is_refused(name, tmp_path):
     assert said in str(caught.value) and str(caught.value).count("fix:") == 1
 
 
-#: What is given in place of K at a speed, K_G = 1e-3 of K: whether a mesh is refused, and a model of few dofs noted.
+def test_a_model_file_in_capitals(tmp_path):
+    """It was read as a matrix, and its own import into it advised."""
+    for name, stiffness in (("rest.h5", K), ("turning.H5", at(30.0))):
+        write_model(tmp_path / name, fw.Structure(sp.csr_matrix(M), sp.csr_matrix(stiffness)))
+    path = written(tmp_path, '[model]\nfile = "rest.h5"\nat_speed = { 30 = "turning.H5" }\n')
+    assert np.abs(spin_of(path) - K2).max() < ROUNDING
+
+
+def test_a_matrix_file_that_a_case_does_not_read(tmp_path):
+    """The way over a model file ends at this key, not at another source of the model."""
+    (tmp_path / "turning.sti").write_text("1 1 50.0\n1 2 -20.0\n2 2 30.0\n")
+    path = written(tmp_path, inline(n30=at(30.0)).split("at_speed")[0] + 'at_speed = { 30 = "turning.sti" }\n')
+    with pytest.raises(CaseErrors, match='brings it into a model file, 30 = ".*turning.h5"'):
+        load_case(path)
+
+
+#: What is given in place of K at a speed, K_G = 1e-3 of K: whether a mesh is refused (one without cells noted), and a
+#: model of few dofs noted.
 SLIPS = {
     "all of it": (lambda K: 1.001 * K, False, False),
     "stress stiffness alone": (lambda K: 1e-3 * K, True, True),
@@ -127,24 +144,40 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("slip", SLIPS)
-@pytest.mark.parametrize("meshed", [True, False])
-def test_another_stiffness_than_at_speed(slip, meshed, tmp_path):
+@pytest.mark.parametrize("known", ["cells", "dofs", "nothing"])
+def test_another_stiffness_than_at_speed(slip, known, tmp_path):
     """Of a mesh stress changes K by thousandths; 0 Hz came of the others beyond the speed, without a word."""
     bar = hexahedra.bar((4, 1, 2), (0.1, 0.02, 0.01))
     free = np.setdiff1d(np.arange(bar.K.shape[0]), bar.layer(0.0))
     M, K = (A[free][:, free] for A in (bar.M, bar.K))
-    labels = np.column_stack([free // 3 + 1, free % 3 + 1]) if meshed else None
-    write_model(tmp_path / "rest.h5", fw.Structure(M, K, labels=labels))
+    labels = None if known == "nothing" else np.column_stack([free // 3 + 1, free % 3 + 1])
+    rest = fw.Structure(M, K, labels=labels)
+    if known == "cells":
+        number, square = np.arange(len(bar.nodes)).reshape(5, 2, 3), ((0, 0), (1, 0), (1, 1), (0, 1))
+        rest.node_numbers, rest.coordinates = np.arange(1, len(bar.nodes) + 1), bar.nodes
+        rest.hexahedra = np.array(
+            [[number[i + a, b, k + c] for c in (0, 1) for a, b in square] for i in range(4) for k in (0, 1)]
+        )
+    write_model(tmp_path / "rest.h5", rest)
     given, refused, noted = SLIPS[slip]
     sp.save_npz(tmp_path / "turning.npz", sp.csr_matrix(given(K)))
     path = written(tmp_path, '[model]\nfile = "rest.h5"\nat_speed = { 30 = "turning.npz" }\n')
-    if meshed and refused:
+    if known == "cells" and refused:
         with pytest.raises(CaseErrors, match="is not that of this mesh") as caught:
             load_case(path)
         assert str(caught.value).count("fix:") == 1
         return
     notes = [note for note in load_case(path).notes if "is it all of K at this speed" in note]
-    assert len(notes) == (noted and not meshed)
+    assert len(notes) == {"cells": False, "dofs": refused, "nothing": noted}[known]
+
+
+def test_a_beam_reduced_to_its_tip(tmp_path):
+    """The tension of a slender beam stiffens its tip by as much as its bending does, with a table of dofs too."""
+    K, M = sp.csr_matrix([[50.0]]), sp.csr_matrix([[0.5]])
+    write_model(tmp_path / "rest.h5", fw.Structure(M, K, labels=np.array([[17, 2]])))
+    sp.save_npz(tmp_path / "turning.npz", 1.86 * K)
+    notes = load_case(written(tmp_path, '[model]\nfile = "rest.h5"\nat_speed = { 30 = "turning.npz" }\n')).notes
+    assert any("K changes by 0.86 of that at rest" in note for note in notes)
 
 
 #: A sector of a ring: a mass on the rim, tied to the next one, that carries a blade of two.

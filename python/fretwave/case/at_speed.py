@@ -28,9 +28,11 @@ from .toml.source import Source
 SAME_MASS = 1e-9
 #: Share of a mesh's stiffness that rotation does not change: stresses are some thousandths of the modulus.
 MOST_CHANGED = 0.3
+SHELLS = ("triangle", "quadrilateral")
+#: Share of the nodes of its cells that have dofs in a mesh that was not reduced.
+MOST_MESHED = 0.5
 #: Sizes of another model's stiffness over that at rest beyond which its stress stiffness, or other units, are meant.
 LEAST_LEFT, MOST_GROWN = 0.5, 100.0
-MODEL_FILE = ".h5"
 EXAMPLE = 'at_speed = { 3000 = "K3000.mtx" }'
 
 
@@ -52,7 +54,10 @@ def with_speeds(
     squares, changes = [], []
     for text, given in section.at_speed.items():
         key = ("model", "at_speed", text)
-        square, read = square_of(text, key, source, found, EXAMPLE), _stiffness(given, key, structure, source, notes, found)
+        square, read = (
+            square_of(text, key, source, found, EXAMPLE),
+            _stiffness(given, key, structure, source, notes, found),
+        )
         if square is not None and read is not None:
             squares.append(square)
             changes.append(read[0] - at_rest)
@@ -67,19 +72,36 @@ def with_speeds(
 
 
 def _much(change: Sparse, at_rest: Sparse, structure: Structure, where: str, found: Found) -> list[str]:
-    """An error where a mesh changes by more than any stress does; a note where another model is hardly that at rest."""
+    """An error where cells of solids change by more than any stress does; a note of other models that look so.
+
+    A beam reduced to its tip changes rightly by most of its stiffness, with a table of its few dofs too.
+    """
     size = _size(at_rest) or 1.0
     share, ratio = _size(change) / size, _size(at_rest + change) / size
-    if structure.labels is None:
-        asked = "is it all of K at this speed, and in the same units?"
+    if not _is_solid(structure):
+        asked = "is it all of K at this speed, and in the same units and order of dofs?"
         odd = not LEAST_LEFT < ratio < MOST_GROWN
-        return [f"stiffness at speed: its entries are {ratio:.2g} of those at rest: {asked}"] if odd else []
+        if odd or structure.labels is None:
+            return [f"stiffness at speed: its entries are {ratio:.2g} of those at rest: {asked}"] if odd else []
+        return (
+            [f"stiffness at speed: K changes by {share:.2g} of that at rest: {asked}"] if share > MOST_CHANGED else []
+        )
     if share > MOST_CHANGED:
         what, measured = "the stiffness at speed is not that of this mesh", f"K changes by {share:.2g} of that at rest"
         fix = "give elastic and stress stiffness in one K, in the units and the order of dofs of that at rest"
         expected = f"at most {MOST_CHANGED:g}, as stresses are some thousandths of the modulus"
         found.append(InputError(what, where, measured, expected, fix))
     return []
+
+
+def _is_solid(structure: Structure) -> bool:
+    """Its dofs are those of cells of solids: most nodes of these have some, as those of a reduced mesh have not."""
+    tables = [structure.hexahedra, *(table for kind, table in structure.cells.items() if kind not in SHELLS)]
+    found = [np.ravel(table) for table in tables if table is not None]
+    if not found or structure.labels is None or structure.node_numbers is None:
+        return False
+    meshed = np.asarray(structure.node_numbers)[np.unique(np.concatenate(found))]
+    return bool(np.isin(meshed, structure.labels[:, 0]).mean() >= MOST_MESHED)
 
 
 def _turning(section: ModelSection, structure: Structure) -> Structure:
@@ -129,7 +151,7 @@ def _stiffness(
 ) -> tuple[Sparse, Any] | None:
     """K at a speed, on the dofs of the model at rest, and what identifies it; None when something is wrong."""
     digest: Any
-    if isinstance(given, str) and given.endswith(MODEL_FILE):
+    if isinstance(given, str) and given.lower().endswith(matrices.MODEL_FILE):
         read = read_file(given, key, source, found)
         if read is None:
             return None
