@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.linalg
-import scipy.sparse as sp
 from models.two_bars import Two
 from tolerances import LAST_BIT, SOLVED
 
@@ -187,26 +186,3 @@ def test_unmatched_nodes_are_named(tmp_path: Path, capfd) -> None:
     partner = two.ends[len(two.ends) // 2]
     assert f"2 of 6 + 6 nodes: {two.ends[0]} (0.001 away), {partner} (0.001 away)" in text
     assert main([*two.write(tmp_path), "--pairs", "LEFT", "RIGHT", "--normal", "1,0,0", "--tolerance", "2e-3"]) == 0
-
-
-@pytest.mark.parametrize("share", [1.0, 1e-3, 1e-7])
-@pytest.mark.parametrize("reduced", [False, True])
-def test_stiffness_that_holds_the_contact(
-    share: float, reduced: bool, tmp_path: Path, capfd: pytest.CaptureFixture
-) -> None:
-    """Springs between the sides are contact, unless they are weak, or M joins the sides as a reduction does."""
-    two = Two()
-    ends = [3 * (two.sets[name] - 1) for name in ("LEFT", "RIGHT")]
-    rows, pairs = np.arange(len(ends[0])), np.zeros((len(ends[0]), two.K.shape[0]))
-    pairs[rows, ends[0]], pairs[rows, np.flip(ends[1])] = 1.0, -1.0
-    springs = sp.csr_matrix(pairs.T @ pairs)
-    two.K = sp.csr_matrix(two.K + share * two.K.diagonal().max() * springs)
-    if reduced:
-        two.M = sp.csr_matrix(two.M + 1e-9 * two.M.diagonal().max() * springs)
-    status = main([*two.write(tmp_path, True), "--pairs", "joint=LEFT", "RIGHT"])
-    said = capfd.readouterr().err
-    if share < 1e-6 or reduced:
-        assert status == 0 and not said
-    else:
-        assert status == 2 and "the stiffness holds the contact 'joint' already" in said
-        assert "both sides of 6 of 6 pairs" in said and said.count("fix:") == 1 and not (tmp_path / "m.h5").exists()

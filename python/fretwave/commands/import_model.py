@@ -117,7 +117,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         found.notes.append(said_of(wheel, model))
     model.pairs = dict(_pairs(options, labels, nodes, wheel, found.notes))
     check_directions(model)
-    check_unjoined(model, where)
+    found.warnings += check_unjoined(model, where)
     if wheel is not None and nodes is not None:
         found.warnings += check_untied(model, wheel, nodes, options.tolerance)
     return model, found, [] if nodes is None else nodes.materials
