@@ -38,8 +38,8 @@ PLACES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 class Skew:
     """A bar held at its end, turned aslant as a whole: matrices of the free dofs, nodes, and labels."""
 
-    def __init__(self) -> None:
-        self.bar = hexahedra.bar((7, 3, 2), (0.06, 0.02, 0.01))
+    def __init__(self, length: float = 0.06) -> None:
+        self.bar = hexahedra.bar((7, 3, 2), (length, 0.02, 0.01))
         self.turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
         self.turn *= np.linalg.det(self.turn)
         self.free = np.setdiff1d(np.arange(self.bar.K.shape[0]), self.bar.layer(0.0))
@@ -103,3 +103,68 @@ def test_rows_of_the_nodes(skew: Skew, more: str, deck: bool, tmp_path: Path, ca
     K = sp.csr_matrix(skew.K + added)[order][:, order]
     assert main(turned.command(tmp_path, labels, skew.points, deck, K)) == 0
     assert "K resists" not in capfd.readouterr().out
+
+
+def springs(skew: Skew, ends: list[tuple[int, int]]) -> sp.spmatrix:
+    """Stiffness of springs along x alone between places of nodes, which resist a turn where x is not their axis."""
+    row = {label: number for number, label in enumerate(skew.labels)}
+    way = np.zeros((len(ends), skew.K.shape[0]))
+    for number, (a, b) in enumerate(ends):
+        way[number, row[a + FIRST, 1]], way[number, row[b + FIRST, 1]] = 1.0, -1.0
+    return sp.csr_matrix(skew.K.diagonal().max() * way.T @ way)
+
+
+def imported(skew: Skew, folder: Path, K: sp.spmatrix, deck: Callable[[str], str] = str) -> int:
+    command = skew.command(folder, skew.labels, skew.points, True, K)
+    (folder / "n.inp").write_text(deck((folder / "n.inp").read_text()))
+    return main(command)
+
+
+def without_first_layer(text: str) -> str:
+    """The elements that join the held nodes are others' than the deck's."""
+    return "".join(line for line in text.splitlines(keepends=True) if line[:2] not in [f"{e}," for e in range(1, 7)])
+
+
+#: Places of nodes in one cell, a layer of 12 apart; and two layers apart.
+NEAR, FAR = [(n, n + 13) for n in range(12, 60, 3)], [(n, n + 24) for n in range(24, 34)]
+#: Springs in K, the deck, and what it is that the deck does not name or the importer does not read.
+PART: dict[str, tuple[list[tuple[int, int]], Callable[[str], str]]] = {
+    "springs across cells": (FAR, str),
+    "cells": ([], without_first_layer),
+    "few springs": (NEAR[:2], str),
+    "elements that are not read": (NEAR, lambda text: f"{text}*ELEMENT, TYPE=SPRING2\n99,63,76\n"),
+    "joined nodes": (NEAR, lambda text: f"{text}*MPC\nBEAM,63,76\n"),
+}
+
+
+@pytest.mark.parametrize("part", PART)
+def test_a_deck_of_a_part_of_the_model(skew: Skew, part: str, tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    """Right models: what turns with the deck's cells is less than what K holds."""
+    ends, deck = PART[part]
+    skew = Skew(0.02) if part == "cells" else skew  # thin, so that all of a layer feel the next one
+    assert imported(skew, tmp_path, skew.K + springs(skew, ends), deck) == 0
+    said = capfd.readouterr()
+    assert "warning: K resists a turn of the whole body at" in said.out and not said.err
+
+
+def test_a_skin_of_a_superelement(skew: Skew, tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    """Reduced statically to a face, which shells show: each node feels those that are held."""
+    top = np.arange(96).reshape(8, 4, 3)[:, :, 2]
+    kept = np.flatnonzero([node - FIRST in top for node, _ in skew.labels])
+    inside = np.setdiff1d(np.arange(len(skew.labels)), kept)
+    G = np.zeros((len(skew.labels), len(kept)))
+    G[kept, np.arange(len(kept))] = 1.0
+    K = skew.K.toarray()
+    G[inside] = -np.linalg.solve(K[np.ix_(inside, inside)], K[np.ix_(inside, kept)])
+    part = Skew()
+    part.M, part.labels = sp.csr_matrix(G.T @ skew.M @ G), [skew.labels[dof] for dof in kept]
+    faces = [top[i : i + 2, j : j + 2].ravel()[[0, 1, 3, 2]] + FIRST for i in range(7) for j in range(3)]
+    shells = "".join(f"{e},{','.join(map(str, face))}\n" for e, face in enumerate(faces, 1))
+
+    def skin(text: str) -> str:
+        nodes = text[: text.index("*ELEMENT")].splitlines()
+        own = [line for line in nodes if line.startswith("*") or int(line.split(",")[0]) - FIRST in top]
+        return "\n".join([*own, "*ELEMENT, TYPE=S4", shells])
+
+    assert imported(part, tmp_path, sp.csr_matrix(G.T @ K @ G), skin) == 0
+    assert "warning: K resists a turn of the whole body at" in capfd.readouterr().out

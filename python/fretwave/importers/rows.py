@@ -61,7 +61,7 @@ def check_rows(model: Structure, nodes: Nodes, where: str) -> list[str]:
         return []
     measured = f"K resists a turn of the whole body at {broken} of {counted(len(share), 'node')} among free ones"
     measured += f" that were looked at, by up to {share.max():.0%}"
-    if broken <= FEW * len(share) or nodes.constraints.joins or nodes.elements.left_out:
+    if broken <= FEW * len(share) or nodes.constraints.joins or nodes.elements.left_out or rows.beyond(tables):
         return [measured]
     what = "rows of the matrices are not of the nodes that are named"
     fix = "give --dofs FILE as the matrices were written, and the coordinates of the same model"
@@ -107,6 +107,21 @@ class _Rows:
         with np.errstate(invalid="ignore"):
             return np.asarray(np.nan_to_num(np.sqrt(sums[0] / sums[1]))[places])
 
+    def beyond(self, tables: list[IntArray]) -> bool:
+        """The cells are some of those of K: it joins all that they join and more, or a node without dofs is in none."""
+        count = len(self.points)
+        within, meshed = _joined_by(tables, count), np.zeros(count, dtype=bool)
+        meshed[np.concatenate([table.ravel() for table in tables])] = True
+        known = np.bincount(self.node, minlength=count) > 0
+        K, keep = self.K.tocoo(), sp.diags(known.astype(float))
+        stored = K.data != 0
+        ends = self.node[K.row[stored]], self.node[K.col[stored]]
+        by_K = sp.csr_matrix((np.ones(len(ends[0])), ends), (count, count)).sign()
+        within = keep @ within @ keep
+        both = by_K.multiply(within).nnz
+        lacks = within.nnz - both
+        return lacks <= FEW * within.nnz and bool(by_K.nnz > both or (~known & ~meshed).any())
+
     def apart(self) -> Which:
         """Whole nodes apart from those without dofs, which may be held, by how far most nodes are joined."""
         absent, places = np.setdiff1d(np.arange(len(self.points)), self.node), self.some(self.whole)
@@ -130,6 +145,16 @@ def _rows_of(model: Structure, labels: IntArray, nodes: Nodes) -> _Rows:
     whole = free.all(axis=1)
     whole[node[np.diff(K[known][:, np.flatnonzero(~meshed & ~inside)].indptr) > 0]] = False
     return _Rows(K[known][:, known], node, direction, nodes.coordinates, whole)
+
+
+def _joined_by(tables: list[IntArray], count: int) -> sp.csr_matrix:
+    """1 for each two nodes of one cell (count, count)."""
+    found = sp.csr_matrix((count, count))
+    for table in tables:
+        cells = np.repeat(np.arange(len(table)), table.shape[1])
+        inside = sp.csr_matrix((np.ones(table.size), (cells, table.ravel())), (len(table), count))
+        found = found + inside.T @ inside
+    return found.sign()
 
 
 def _inner(whole: Which, tables: list[IntArray]) -> Which:
