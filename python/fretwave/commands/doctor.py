@@ -242,13 +242,6 @@ def guarded(name: str, find: Callable[[], list[Check]]) -> list[Check]:
     except Exception as error:
         first = (str(error).strip().splitlines() or [""])[0]
         return [Check(name, False, f"{type(error).__name__}: {first}", "installed and importable", ".ci/setup")]
-    finally:
-        pipes_break_in_python()
-
-
-def pipes_break_in_python() -> None:
-    """PETSc, once imported, takes a reader who has left for a fault (`python doctor.py | head`)."""
-    signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def find_numpy() -> list[Check]:
@@ -352,7 +345,6 @@ def tuned_constants() -> str:
     """A line each: option of PETSc, value without it, meaning."""
     from fretwave import _core
 
-    pipes_break_in_python()
     rows = [(f"-{option}", f"{value:g}", meaning) for option, value, meaning in _core.tuned_constants()]
     widths = [max(map(len, column)) for column in zip(*rows)]
     return "\n".join(f"{a:<{widths[0]}}  {b:>{widths[1]}}  {c}" for a, b, c in rows)
@@ -379,4 +371,5 @@ def main(argv: Sequence[str] | None = None, write: Callable[[str], object] = pri
 
 if __name__ == "__main__":
     sys.path.pop(0)  # this folder: its modules are the package's, not top-level ones
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})  # PETSc takes a reader who has left for a fault
     sys.exit(main(sys.argv[1:]))

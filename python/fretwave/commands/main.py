@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -44,8 +45,13 @@ def _pipes_break_in_python() -> Iterator[None]:
     try:
         yield
     finally:
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # forgets one that waits
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        try:
+            if signal.SIGPIPE in signal.sigpending():
+                signal.sigwait({signal.SIGPIPE})
+            if threading.current_thread() is threading.main_thread():  # others may set no handler
+                signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _dispatch(arguments: list[str]) -> int:
