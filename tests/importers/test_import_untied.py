@@ -64,3 +64,15 @@ def test_a_node_on_the_axis(held: bool) -> None:
     with pytest.raises(InputError, match="free nodes lie on the axis") as caught:
         check_untied(model, wheel, nodes, None)
     assert caught.value.fix and "nodes 3" in str(caught.value.where)
+
+
+def test_nodes_of_a_narrow_sector(tmp_path: Path) -> None:
+    """Of 100 sectors a bore of 30 moves by 1.9 to the next one: less than pairs may be apart, and not on the axis."""
+    radius, angle = np.repeat([30.0, 40.0], 2), 2 * np.pi / 100 * np.tile([-0.5, 0.5], 2)
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0 * radius])
+    nodes = Nodes(np.arange(1, 5), points, "four", {"LOW": np.array([1, 3]), "HIGH": np.array([2, 4])})
+    nodes.coordinates = np.vstack([points, [[30.0, 0, 0]]])
+    nodes.numbers = np.arange(1, 6)
+    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], 5)])
+    model = fw.Structure(np.eye(15), np.eye(15), labels=labels)
+    assert check_untied(model, SectorFaces(100, "LOW", "HIGH", "z"), nodes, 2.0) == []

@@ -31,12 +31,12 @@ def check_untied(model: Structure, wheel: SectorFaces, nodes: Nodes, tolerance: 
     points, numbers = nodes.coordinates[own], nodes.numbers[own]
     gap, partner = cKDTree(points).query(points @ wheel.turn.T)
     there = gap <= reach_of(nodes, tolerance)
-    centre = numbers[there & (partner == np.arange(len(own)))]
+    centre = numbers[np.linalg.norm(points @ wheel.turn.T - points, axis=1) <= reach_of(nodes, None)]
     if len(centre):
         where, fix = f"{nodes.where}, nodes {_listed(centre)}", "give the wheel a hole along its axis, or hold them"
         raise InputError("free nodes lie on the axis", where, f"{len(centre)} nodes", "none: all share them", fix)
     joined = np.isin(numbers, _joined(model, wheel, nodes))
-    loose = there & ~joined & ~joined[partner]
+    loose = there & ~joined & ~joined[partner] & (partner != np.arange(len(own)))
     if not loose.any():
         return []
     which, faces = counted(int(loose.sum()), "free node"), f"{wheel.low} and {wheel.high}"
