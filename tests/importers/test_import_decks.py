@@ -24,8 +24,10 @@ GOOD = {
     "a surface twice": "*SURFACE, NAME=TOP\nE, S2\n*SURFACE, NAME=TOP\nE, S2\n",
     "lines of a set included": '*NSET, NSET=TOP\n5\n*INCLUDE, INPUT="more.txt"\n8\n',
     "lines of a set in a file": "*NSET, NSET=TOP, INPUT=more.txt\n*NSET, NSET=TOP\n5,8\n",
-    "an element in a file": TOP + "*NODE, INPUT=nodes.txt\n*ELEMENT, TYPE=C3D8, INPUT=cell.txt\n",
+    "an element in a file": "*NODE, INPUT=nodes.txt\n*ELEMENT, TYPE=C3D8, INPUT=cell.txt\n*SURFACE, NAME=TOP\n2, S2\n",
+    "a surface in a file": "*SURFACE, NAME=TOP, INPUT=faces.txt\n",
     "a system that ends": TOP + "*SYSTEM\n",
+    "a system that turns nothing": "*SYSTEM\n0,0,0,2.,0,0\n0,1.,0\n" + TOP + "*SYSTEM\n,,\n*SYSTEM\n0,0,0,1\n",
     "a skin of shells": TOP + "*ELEMENT, TYPE=S4\n2,8,7,6,5\n",
     "a part that stands once": TOP + "*INSTANCE, NAME=P-1, PART=P\n*END INSTANCE\n",
 }
@@ -39,6 +41,8 @@ WRONG = {
     "5,8,1,7": "*NSET, NSET=TOP, GENERATE\n5,8,1,7\n",
     "directions of nodes are turned": TOP + "*TRANSFORM, NSET=TOP, TYPE=C\n0,0,0,0,0,1\n",
     "turned or moved": TOP + "*SYSTEM\n0,0,0,0,1,0\n",
+    "coordinates of nodes are": TOP + "*SYSTEM\n0,0,1.,1.,0,1.\n",
+    "are turned or": TOP + "*SYSTEM\n0,0,0,1.,0,0\n0,0,1.\n",
     "\\*NGEN": TOP + "*NGEN, NSET=TOP\n5,8,1\n",
     "\\*ELGEN": TOP + "*ELGEN, ELSET=E\n1,3,4,1\n",
     "a part has two instances": TOP + 2 * "*INSTANCE, NAME=P-1, PART=P\n*END INSTANCE\n",
@@ -51,7 +55,8 @@ TETRAHEDRON += [(0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0, 0, 0.5), (0.5, 0, 0
 def read(folder: Path, text: str) -> Nodes:
     (folder / "more.txt").write_text("6\n7\n")
     (folder / "nodes.txt").write_text("9,0,0,-1\n10,1,0,-1\n11,1,1,-1\n12,0,1,-1\n")
-    (folder / "cell.txt").write_text("2,9,10,11,12,1,2,3,4\n")
+    (folder / "cell.txt").write_text("2,9,10,11,12,5,6,7,8\n")
+    (folder / "faces.txt").write_text("E, S2\n")
     (folder / "loop.txt").write_text("*INCLUDE, INPUT=loop.txt\n")
     (folder / "deck.inp").write_text(CUBE + text)
     return read_nodes(folder / "deck.inp")
@@ -61,6 +66,10 @@ def test_fields_of_nodes(tmp_path: Path) -> None:
     """Blank ones, and exponents of Fortran."""
     corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     np.testing.assert_array_equal(read(tmp_path, "").coordinates, corners)
+
+
+def test_nodes_in_a_file(tmp_path: Path) -> None:
+    assert read(tmp_path, "*NODE, INPUT=nodes.txt\n").numbers.tolist() == list(range(1, 13))
 
 
 @pytest.mark.parametrize("form", GOOD)

@@ -78,3 +78,16 @@ def _keyword(text: str) -> tuple[str, dict[str, str]]:
     words = [word.strip() for word in text[1:].split(",")]
     pairs = [word.partition("=") for word in words[1:] if word]
     return words[0].upper(), {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
+
+
+def turns_nothing(data: Lines) -> bool:
+    """A ``*SYSTEM`` that ends, or whose origin is (0, 0, 0), b on axis x and c in the plane x, y: the global one."""
+    try:
+        given = [[number(word.strip()) for word in text.split(",")] for _, text in data]
+    except ValueError:
+        return False
+    (ax, ay, az, bx, by, bz), (cx, cy, cz) = (
+        ((given[k] if k < len(given) else []) + width * [0.0])[:width] for k, width in ((0, 6), (1, 3))
+    )
+    along = bx > 0 or not (bx or cx or cy)  # without b it is moved alone
+    return along and not (ax or ay or az or by or bz or cz) and (cy > 0 or not (cx or cy))

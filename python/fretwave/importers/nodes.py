@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..texts import display, nearest
 from .cells import Elements
 from .constraints import Constraints
-from .keywords import Lines, blocks, number
+from .keywords import Lines, blocks, number, turns_nothing
 from .text import columns_of, head_of, whole
 
 _FLAT = "write the deck flat, with every node and element in it where it is"
@@ -193,7 +193,7 @@ class Deck:
                 self._add_material(keyword, options, data)
             elif keyword == "INSTANCE":
                 self._add_instance(options, data)
-            elif keyword in REFUSED and (data or keyword != "SYSTEM"):  # without data it ends
+            elif keyword in REFUSED and not (keyword == "SYSTEM" and turns_nothing(data)):
                 what, expected, fix = REFUSED[keyword]
                 raise InputError(what, self.where, f"*{keyword}", expected, fix)
 
