@@ -171,10 +171,16 @@ def test_another_stiffness_than_at_speed(slip, known, tmp_path):
     assert len(notes) == {"cells": False, "dofs": refused, "nothing": noted}[known]
 
 
-def test_a_beam_reduced_to_its_tip(tmp_path):
+@pytest.mark.parametrize("drawn", [False, True])
+def test_a_beam_reduced_to_its_tip(drawn, tmp_path):
     """The tension of a slender beam stiffens its tip by as much as its bending does, with a table of dofs too."""
     K, M = sp.csr_matrix([[50.0]]), sp.csr_matrix([[0.5]])
-    write_model(tmp_path / "rest.h5", fw.Structure(M, K, labels=np.array([[17, 2]])))
+    rest = fw.Structure(M, K, labels=np.array([[17, 2]]))
+    if drawn:  # the cells that it was reduced from
+        bar = hexahedra.bar((1, 1, 1), (0.1, 0.02, 0.01))
+        rest.node_numbers, rest.coordinates = np.arange(10, 18), bar.nodes
+        rest.hexahedra = np.array([[0, 4, 6, 2, 1, 5, 7, 3]])
+    write_model(tmp_path / "rest.h5", rest)
     sp.save_npz(tmp_path / "turning.npz", 1.86 * K)
     notes = load_case(written(tmp_path, '[model]\nfile = "rest.h5"\nat_speed = { 30 = "turning.npz" }\n')).notes
     assert any("K changes by 0.86 of that at rest" in note for note in notes)
