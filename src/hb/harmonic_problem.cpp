@@ -23,7 +23,7 @@ model::Model const& countable(model::Model const& model, Harmonics const& h) {
 
 }  // namespace
 
-std::string gap_text(double distance) { return "gaps " + short_text(distance) + " m wider"; }
+std::string gap_text(double distance) { return "gaps " + short_text(distance) + " wider"; }
 
 HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, Row row,
                                  double reference_stiffness)

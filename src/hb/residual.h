@@ -77,7 +77,7 @@ class Residual {
   /// Widens all gaps by a distance [length] that is no wear, in the laws, which all residuals of the model
   /// share.
   void stand_off(double distance);
-  /// dR for gaps that all grow by 1 m, at the last evaluated point. Collective.
+  /// dR for gaps that all grow by one unit of length, at the last evaluated point. Collective.
   void stand_off_product(Vec dR);
   /// dR for gaps that grow, at the last evaluated point. Collective.
   void gap_product(PerContact const& dgap, Vec dR);
