@@ -223,7 +223,6 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   if (!(distance(trial.y, guess) <= beyond + on)) return {};
   if (!(dot(row, trial.tangent) >= std::cos(steps_.max_angle))) return {};
   if (!placed && orientation(trial.y, trial.tangent) < 0) return {};
-  if (dot(row_, trial.tangent) < no_corner - 1) return {};  // it would pass the same motions again
   return trial;
 }
 
