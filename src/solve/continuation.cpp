@@ -25,8 +25,7 @@ const Tuned grid("branch_grid", 16, "lengths of steps in every factor of two");
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
 double on_grid(double length) { return std::exp2(std::round(grid * std::log2(length)) / grid); }
-constexpr double end_known = 1e-4;  // arclength: so near to what is no solution a branch ends
-constexpr double shorter = 0.75;    // of the step tried before, one that is tried again
+constexpr double shorter = 0.75;  // of the step tried before, one that is tried again
 
 }  // namespace
 
@@ -79,10 +78,6 @@ bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row,
   if (!trial.outcome.converged) return false;
   if (const std::string why = problem_.impossible(trial.y); !why.empty()) {
     trial.outcome.reason = why;
-    return false;
-  }
-  if (const std::string why = problem_.adrift(trial.y); !why.empty()) {
-    trial.outcome.reason = why, trial.adrift = true;
     return false;
   }
   if (!trial.tangent) trial.tangent = zero_like(trial.y);
@@ -185,9 +180,8 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
   const bool solved = correct(trial, row_, row_value_ + length, row_, effort);
   failure.last = solved ? complaint(trial, length, may_shorten) : trial.outcome.reason;
   if (failure.last.empty()) return trial;
-  if (trial.adrift) failure.adrift = true;
-  if (trial.adrift || (!solved && failure.last.ends_with(')'))) failure.explained = failure.last;
-  if (may_shorten || failure.adrift) return {};
+  if (!solved && failure.last.ends_with(')')) failure.explained = failure.last;
+  if (may_shorten) return {};
   if (!wary)
     if (auto behind = turn_next_corner(length)) return behind;
   return turned(turn_corner(length, length, false), length);  // one that no piece's number tells of
@@ -201,7 +195,7 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
   double soft = INFINITY;  // an end of the present piece that is no corner
   wary_ = anchor_.wary;
   for (const bool beyond : {false, true}) {
-    if (beyond && (!wary_ || failure.adrift)) break;
+    if (beyond && !wary_) break;
     double intended = anchor_.step;  // but for the ends of pieces
     for (length = intended; length >= steps_.minimum; length = intended) {
       auto trial = attempt(length, wary_ && !beyond, failure);
@@ -212,7 +206,6 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
         return trial;
       }
       intended = length / 2;
-      if (failure.adrift && length < end_known) break;
       if (!wary_ && length < soft) wary_ = corner_within(length, soft);
     }
   }

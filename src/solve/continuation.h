@@ -85,12 +85,10 @@ class Continuation {
     std::vector<TestFunction> tests;
     double error = 0;  ///< of the cubic from the anchor to it
     int sign = 0;      ///< as an anchor's
-    bool adrift = false;
   };
   /// Why trials were none: the last one; one of a corrector that knows why.
   struct Failure {
     std::string last, explained;
-    bool adrift = false;  ///< a solution ahead is none
   };
   /// A place inside the present step that Newton has been to.
   struct Place {

@@ -76,9 +76,6 @@ class Problem {
   virtual std::string parameter_text(double value) const { return short_text(value); }
   /// Why a solution cannot be a point of the branch (a frequency below zero); nothing if it can. Collective.
   virtual std::string impossible(Vec /*y*/) { return {}; }
-  /// Why a solution is none but for rounding, which bears what nothing else does: the branch ends before it;
-  /// nothing if it is one. Collective.
-  virtual std::string adrift(Vec /*y*/) { return {}; }
   /// Why the branch leads nowhere from here (it grows without bound); nothing while it does. Collective.
   virtual std::string beyond(Vec /*y*/) { return {}; }
 
