@@ -59,7 +59,9 @@ def positive_or_infinite(name: str, value: object) -> float:
     ------
     InputError
     """
-    return np.inf if isinstance(value, float) and value == np.inf else positive(name, value)
+    found = _array(value)
+    endless = found.shape == () and found.dtype.kind == "f" and found == np.inf
+    return np.inf if endless else positive(name, value)
 
 
 def numbers(
@@ -88,5 +90,5 @@ def _array(values: object) -> Array:
         found = np.asarray(values)
         fractions = found.dtype == object and all(isinstance(value, numbers_abc.Real) for value in found.flat)
         return found.astype(float) if fractions else found
-    except ValueError:
+    except (ValueError, OverflowError):
         return np.array(None)

@@ -86,7 +86,6 @@ bool symmetric(Mat A) {
 }
 
 bool hermitian(std::vector<PhasedMap> const& terms, double theta) {
-  constexpr double rounding = 1e-10;
   for (const bool by_rows : {true, false}) {
     const VecHandle x = scrambled_rows(terms[0].B, 0, by_rows), y = scrambled_rows(terms[0].B, 1, by_rows),
                     product = like(x);
@@ -105,7 +104,7 @@ bool hermitian(std::vector<PhasedMap> const& terms, double theta) {
       const auto turn = std::exp(-1i * (phase * theta));
       difference += turn * form(x, A, y) - std::conj(turn) * form(y, A, x);
     }
-    if (std::abs(difference) <= rounding * size) return true;
+    if (std::abs(difference) <= (by_rows ? 1e-10 : 1e-12) * size) return true;
   }
   return false;
 }

@@ -271,6 +271,16 @@ def test_what_rounding_leaves_of_symmetry_is_none(comm):
         assert not mode.imaginary.any() and 4 * mode.shape @ mode.shape == pytest.approx(1.0, rel=SOLVED)
 
 
+def test_penalties_hide_no_circulatory_forces(comm):
+    """A dof held by 1e12 beside two that flutter: omega^2 = 210 +- i (900 - 100)^(1/2)."""
+    K = np.zeros((3, 3))
+    K[0, 0], K[1:, 1:] = 1e12, [[200.0, 30.0], [-30.0, 220.0]]
+    modes = fw.linear_modes(fw.Model(np.eye(3), K, comm=comm), 2, "free")
+    exact = np.sqrt(210 + 1j * np.sqrt(800.0))
+    assert [mode.omega for mode in modes] == pytest.approx([exact.real] * 2, rel=1e-8)
+    assert sorted(mode.beta for mode in modes) == pytest.approx([-exact.imag, exact.imag], rel=1e-6)
+
+
 def ascending(value):
     return round(value.imag, 6), value.real
 

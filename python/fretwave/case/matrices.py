@@ -129,6 +129,7 @@ def _is_model(path: Path) -> bool:
 
 def _read_known(path: Path, letter: str, notes: list[str]) -> Any:
     from ..importers import formats, matrix_market
+    from ..importers.entries import Entries
 
     if (format := formats.registered(path)) is not None:
         return _as_given(format.read(path, letter, None), letter, notes)
@@ -139,16 +140,15 @@ def _read_known(path: Path, letter: str, notes: list[str]) -> Any:
     with np.load(path) as archive:
         if "format" not in archive.files:
             return archive[letter]
-    return _as_given(scipy.sparse.load_npz(path), letter, notes, path)
+    stored = Entries.of(scipy.sparse.load_npz(path), display(path), "SciPy sparse archive")
+    return _as_given(stored, letter, notes)
 
 
-def _as_given(found: Any, letter: str, notes: list[str], path: Path | None = None) -> Any:
+def _as_given(found: object, letter: str, notes: list[str]) -> Any:
     """The matrix of a reader, whose entries add up; what has to be put in order is the importer's."""
     from ..importers.entries import Entries
     from ..importers.repeated import check_once
 
-    if path is not None:
-        found = Entries.of(found, display(path), "SciPy sparse archive")
     if not isinstance(found, Entries):
         return found
     if found.labels is not None or found.held is not None or found.half:

@@ -23,7 +23,6 @@ from .sector import Sector, wave_mode
 
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
 ALIKE = 1e-3
-#: Of the generator.
 
 
 def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tuple[LinearMode, Optional[Complex]]:
