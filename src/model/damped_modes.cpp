@@ -211,11 +211,11 @@ std::vector<LinearMode> circulatory_modes(Model const& model, int count, bool st
     throw InputError("modes near a frequency of a structure whose stiffness is not symmetric", "near",
                      "the lowest modes", "leave near out");
   auto stiffness = required(model, 0, "stiffness");
-  for (auto const& contact : model.contacts()) {
-    if (!stuck) break;
-    together(model.comm(), "stuck contact", [&] { refuse_rigid(*contact.law); });
-    add_contact(stiffness, contact, [&](int c, int i) { return contact.law->stuck_stiffness(c, i); });
-  }
+  if (stuck)
+    for (auto const& contact : model.contacts()) {
+      together(model.comm(), "stuck contact", [&] { refuse_rigid(*contact.law); });
+      add_contact(stiffness, contact, [&](int c, int i) { return contact.law->stuck_stiffness(c, i); });
+    }
   return modes_of(model, count, stiffness, {});
 }
 

@@ -78,20 +78,18 @@ def _much(change: Sparse, at_rest: Sparse, structure: Structure, where: str, fou
     """
     size = _size(at_rest) or 1.0
     share, ratio = _size(change) / size, _size(at_rest + change) / size
-    if not _is_solid(structure):
-        asked = "is it all of K at this speed, and in the same units and order of dofs?"
-        odd = not LEAST_LEFT < ratio < MOST_GROWN
-        if odd or structure.labels is None:
-            return [f"stiffness at speed: its entries are {ratio:.2g} of those at rest: {asked}"] if odd else []
-        return (
-            [f"stiffness at speed: K changes by {share:.2g} of that at rest: {asked}"] if share > MOST_CHANGED else []
-        )
-    if share > MOST_CHANGED:
-        what, measured = "the stiffness at speed is not that of this mesh", f"K changes by {share:.2g} of that at rest"
+    solid, changed = _is_solid(structure), f"K changes by {share:.2g} of that at rest"
+    if solid and share > MOST_CHANGED:
         fix = "give elastic and stress stiffness in one K, in the units and the order of dofs of that at rest"
         expected = f"at most {MOST_CHANGED:g}, as stresses are some thousandths of the modulus"
-        found.append(InputError(what, where, measured, expected, fix))
-    return []
+        found.append(InputError("the stiffness at speed is not that of this mesh", where, changed, expected, fix))
+    if solid:
+        return []
+    if not LEAST_LEFT < ratio < MOST_GROWN:
+        changed = f"its entries are {ratio:.2g} of those at rest"
+    elif structure.labels is None or share <= MOST_CHANGED:
+        return []
+    return [f"stiffness at speed: {changed}: is it all of K at this speed, and in the same units and order of dofs?"]
 
 
 def _is_solid(structure: Structure) -> bool:

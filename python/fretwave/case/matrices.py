@@ -147,15 +147,13 @@ def _read_known(path: Path, letter: str, notes: list[str]) -> Any:
 def _as_given(found: object, letter: str, notes: list[str]) -> Any:
     """The matrix of a reader, whose entries add up; what has to be put in order is the importer's."""
     from ..importers.entries import Entries
-    from ..importers.repeated import check_once
 
     if not isinstance(found, Entries):
         return found
     if found.labels is not None or found.held is not None or found.half:
         raise ValueError("it numbers its dofs by nodes; bring it into a model file with `fretwave import`")
-    matrix = scipy.sparse.csr_matrix((found.values, (found.rows, found.columns)), shape=found.shape)
-    if matrix.nnz < len(found.values):
-        notes += check_once(letter, found)
+    matrix, doubts = found.added(letter)
+    notes += doubts
     return matrix
 
 

@@ -71,6 +71,12 @@ class Entries:
         rows, columns = found.row.astype(np.int64), found.col.astype(np.int64)
         return cls(rows, columns, found.data, found.shape, where, kind, mirrored=mirrored)
 
+    def added(self, letter: str) -> tuple[sp.csr_matrix, list[str]]:
+        """What they add up to, real or complex as they are, and warnings of places that stand twice (`check_once`)."""
+        values = self.values if np.iscomplexobj(self.values) else self.values.astype(float)
+        matrix = sp.csr_matrix((values, (self.rows, self.columns)), shape=self.shape)
+        return matrix, check_once(letter, self) if matrix.nnz < len(values) else []
+
 
 @dataclass
 class Assembled:
@@ -133,9 +139,8 @@ def assemble(given: dict[str, Entries], symmetric: str = "auto") -> Assembled:
     labels = _one_numbering(given, notes)
     found = Assembled({}, labels, {}, notes, warnings=[entries.doubt for entries in given.values() if entries.doubt])
     for letter, entries in given.items():
-        matrix = sp.csr_matrix((entries.values.astype(float), (entries.rows, entries.columns)), shape=entries.shape)
-        if matrix.nnz < len(entries.values):
-            found.warnings += check_once(letter, entries)
+        matrix, doubts = entries.added(letter)
+        found.warnings += doubts
         matrix.eliminate_zeros()
         found.matrices[letter] = matrix
     found.given_size = found.size

@@ -189,7 +189,7 @@ def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: flo
     raise InputError(
         "nodes of the contact have no partner" if alone else "two nodes share one partner",
         where,
-        f"{len(alone)} of {len(a.numbers)} + {len(b.numbers)} nodes: {_shown(alone)}"
+        f"{len(alone)} of {len(a.numbers)} + {len(b.numbers)} nodes: {listed(alone)}"
         if alone
         else f"{len(a.numbers)} and {len(b.numbers)} nodes",
         f"one node of the other set within {reach:.3g}, or faces of elements under the second set",
@@ -230,14 +230,15 @@ def _check_on(a: Side, b: Side, distance: Array, where: str, reach: float) -> No
         raise InputError(
             "nodes of the first side do not lie on the second's faces",
             where,
-            f"{len(named)} of {len(a.numbers)} nodes: {_shown(named)}",
+            f"{len(named)} of {len(a.numbers)} nodes: {listed(named)}",
             f"each within {reach:.3g} of a face of {b.where}"
             + (f", or beside them; {LEAST:.0%} on them" if few else ""),
             "name first the side that lies on the other all over" if few else "widen --tolerance, or check the sets",
         )
 
 
-def _shown(named: list[str]) -> str:
+def listed(named: list[str]) -> str:
+    """The first of them, and how many more there are."""
     return ", ".join(named[:SHOWN]) + (f" and {len(named) - SHOWN} more" if len(named) > SHOWN else "")
 
 

@@ -14,7 +14,7 @@ from ..model.sectors import by_sector
 from ..model.structure import Structure
 from ..texts import counted
 from .nodes import Nodes
-from .pairs import SHOWN, reach_of
+from .pairs import listed, reach_of
 from .sector import SectorFaces
 
 
@@ -55,5 +55,4 @@ def _joined(model: Structure, wheel: SectorFaces, nodes: Nodes) -> IntArray:
 
 
 def _listed(numbers: IntArray) -> str:
-    more = f" and {len(numbers) - SHOWN} more" if len(numbers) > SHOWN else ""
-    return ", ".join(map(str, numbers[:SHOWN])) + more
+    return listed([str(number) for number in numbers])
