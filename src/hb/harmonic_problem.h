@@ -48,6 +48,7 @@ class HarmonicProblem : public solve::Problem {
   void metric(Vec y, Vec weights) override;
   double jacobian_entries() const override;
   std::string explain(Vec y, Vec dy) override;
+  std::string adrift(Vec y, Vec dy) override;
 
   Harmonics const& harmonics() const { return residual_.harmonics(); }
   model::Model const& model() const { return residual_.model(); }

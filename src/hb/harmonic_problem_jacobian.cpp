@@ -115,22 +115,6 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   return contacts;
 }
 
-/// A step in the mean alone: friction held it, and what held it slips now.
-std::string HarmonicProblem::explain(Vec, Vec dy) {
-  const PetscInt m = harmonics().block_size();
-  double sums[2] = {};  // of the mean, of all
-  {
-    ReadArray in(dy);
-    for (PetscInt i = 0; i < local_block_; ++i) {
-      sums[1] += in[i] * in[i];
-      if (i % m == 0 && harmonics().orders()[0] == 0) sums[0] += in[i] * in[i];
-    }
-  }
-  MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPI_DOUBLE, MPI_SUM, comm());
-  if (sums[0] < 0.9 * sums[1]) return {};
-  return "the mean position is free: every pair that held it slips or opens within a period";
-}
-
 double HarmonicProblem::jacobian_entries() const {
   const double m = harmonics().block_size();
   double entries = 0, contact = 0;

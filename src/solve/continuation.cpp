@@ -25,7 +25,8 @@ const Tuned grid("branch_grid", 16, "lengths of steps in every factor of two");
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
 double on_grid(double length) { return std::exp2(std::round(grid * std::log2(length)) / grid); }
-constexpr double shorter = 0.75;  // of the step tried before, one that is tried again
+constexpr double end_known = 1e-4;  // arclength: so near to what is no solution a branch ends
+constexpr double shorter = 0.75;    // of the step tried before, one that is tried again
 
 }  // namespace
 
@@ -70,6 +71,14 @@ std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
   return all;
 }
 
+/// Of a trial or its tangent; what lies on a way may stand far from where it ends.
+std::string Continuation::adrift(Trial const& trial) {
+  std::string why;
+  if (!way_) why = problem_.adrift(trial.y, trial.y);
+  if (!way_ && why.empty()) why = problem_.adrift(trial.y, trial.tangent);
+  return why;
+}
+
 /// Newton on the system closed by row . y = value, then the unit tangent there, oriented along `tangent_row`.
 bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row, Effort effort,
                            bool exactly) {
@@ -94,6 +103,10 @@ bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row,
     return false;
   }
   check(VecScale(trial.tangent, 1 / size));
+  if (adrift_ = adrift(trial); !adrift_.empty()) {
+    trial.outcome.reason = adrift_;
+    return false;
+  }
   trial.tests = tests(trial.y, trial.tangent);
   return true;
 }
@@ -164,6 +177,7 @@ std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> beh
 std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, Failure& failure) {
   const bool may_shorten = length > std::max<double>(kink_length, 16 * steps_.minimum);
   turned_ = false;
+  adrift_.clear();
   if (wary)
     if (auto behind = turn_next_corner(length)) return behind;
   VecHandle guess = predicted(length);
@@ -195,7 +209,7 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
   double soft = INFINITY;  // an end of the present piece that is no corner
   wary_ = anchor_.wary;
   for (const bool beyond : {false, true}) {
-    if (beyond && !wary_) break;
+    if (beyond && (!wary_ || !adrift_.empty())) break;
     double intended = anchor_.step;  // but for the ends of pieces
     for (length = intended; length >= steps_.minimum; length = intended) {
       auto trial = attempt(length, wary_ && !beyond, failure);
@@ -206,9 +220,12 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
         return trial;
       }
       intended = length / 2;
+      if (!adrift_.empty()) failure.explained = adrift_;
+      if (!adrift_.empty() && length < end_known) break;
       if (!wary_ && length < soft) wary_ = corner_within(length, soft);
     }
   }
+  if (!adrift_.empty()) return finish(adrift_, false), std::nullopt;
   if (failure.last.empty()) failure.last = "corners of the branch lie closer together than the smallest step";
   finish("step too small: " + (failure.explained.empty() ? failure.last : failure.explained), false);
   return {};

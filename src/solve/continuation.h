@@ -102,6 +102,7 @@ class Continuation {
   /// With its tangent, good for a step along it or `exactly` what its test functions need.
   bool correct(Trial&, Vec row, double value, Vec tangent_row, Effort = Effort::full, bool exactly = false);
   std::vector<TestFunction> tests(Vec y, Vec tangent);
+  std::string adrift(Trial const&);
   void open_the_range();
   void prepare_row();
   double turn_of(Trial const&) const;
@@ -192,6 +193,7 @@ class Continuation {
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
   std::string reason_;
+  std::string adrift_;  ///< why a corrected trial of the present attempt was no solution
   double clock_ = 0;
 };
 

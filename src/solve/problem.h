@@ -76,6 +76,9 @@ class Problem {
   virtual std::string parameter_text(double value) const { return short_text(value); }
   /// Why a solution cannot be a point of the branch (a frequency below zero); nothing if it can. Collective.
   virtual std::string impossible(Vec /*y*/) { return {}; }
+  /// Why a solution y is none but for rounding, which alone bears its part along dy (y itself or the branch's
+  /// unit tangent there): the branch ends before it; nothing if it is one. Collective.
+  virtual std::string adrift(Vec /*y*/, Vec /*dy*/) { return {}; }
   /// Why the branch leads nowhere from here (it grows without bound); nothing while it does. Collective.
   virtual std::string beyond(Vec /*y*/) { return {}; }
 

@@ -53,3 +53,81 @@ def test_holding_the_mean_leaves_errors_as_they_are(route: str, unit: float) -> 
     assert expected["zeta_error"] > 1e-6
     for name in ("omega_error", "zeta_error"):
         assert found[name] == pytest.approx(expected[name], rel=1e-6), name
+
+
+#: A friction force along x of two masses s that a stiff spring joins, and nothing else; the normal force swings with z,
+#: which follows the first mass out of phase.
+N0, MU, KN, KT = 1.0, 0.3, 50.0, 40.0
+PLATE = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+def plate(rounding: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, C, K of x, two masses of the plate, z; its spring is rounded, as printed matrices are."""
+    K = np.diag([100.0, 3e3, 3e3 * (1 + rounding), 110.0])
+    K[1, 2] = K[2, 1] = -3e3
+    K[0, 3] = K[3, 0] = 8.0
+    return np.diag([1.0, 0.05, 0.05, 1.0]), np.diag([0.0, 0.0, 0.0, 2.0]), K
+
+
+def onset() -> float:
+    """Amplitude of x at which the pair first slips.
+
+    The slider w stays off the middle of the motion then, and nothing bears the mean force kt w: |u| <= R at all times,
+    u = a Re(phi_u e^{i t}), R = R0 + r a Re(phi_n e^{i t}), is a |phi_u +- r phi_n| <= R0 with R0 = mu N/kt of the
+    normal force at rest, r = mu kn/kt; phi of the damped mode in stick.
+    """
+    M, C, K = plate(0.0)
+    K = K + PLATE.T @ np.diag([KT, KN]) @ PLATE
+    inverse, one = np.linalg.inv(M), np.eye(4)
+    values, vectors = np.linalg.eig(np.block([[0 * one, one], [-inverse @ K, -inverse @ C]]))
+    phi = vectors[:4, np.argmin(np.where(values.imag > 0, values.imag, np.inf))]
+    u, n = PLATE @ (phi / phi[0])
+    r = MU * KN / KT
+    normal = N0 + KN * np.linalg.solve(K, -N0 * PLATE[1])[3]
+    return float(MU * normal / KT / max(abs(u - r * n), abs(u + r * n)))
+
+
+def test_a_plate_that_creeps_on_ends_the_branch() -> None:
+    """Once the pair slips its mean force pushes the plate on, period by period: no motion is periodic.
+
+    Before, the plate moved by 1e8 to where the rounding of its spring bears that force, and the branch went on there.
+    """
+    M, C, K = plate(1e-13)
+    given = {"friction_coefficient": MU, "normal_stiffness": KN, "tangential_stiffness": KT, "normal_load": N0}
+    model = fw.Model(M, K, C, [fw.Contact("coulomb_2d", PLATE[::-1], given)])
+    branch = fw.follow(fw.NonlinearMode(model, fw.Harmonics(range(6), 256), "CNM", 0), 1e-3, 1.0)
+    assert "mean position is free" in branch.reason
+    assert branch["amplitude"][-1] == pytest.approx(onset(), rel=2e-4)
+    assert all(np.abs(branch.coefficients(k)[..., 0]).max() < 0.01 for k in range(len(branch["amplitude"])))
+
+
+def test_a_soft_spring_holds_a_plate_that_creeps() -> None:
+    """However far: 1e-12 of the plate's own stiffness bears the mean force, which moves the plate by ten motions."""
+    M, C, K = plate(0.0)
+    stiff, soft = 1e10, 1e-2
+    K[1, 1], K[2, 2], K[1, 2], K[2, 1] = stiff, stiff + soft, -stiff, -stiff
+    given = {"friction_coefficient": MU, "normal_stiffness": KN, "tangential_stiffness": KT, "normal_load": N0}
+    model = fw.Model(M, K, C, [fw.Contact("coulomb_2d", PLATE[::-1], given)])
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(6), 256), "CNM", 0)
+    branch = fw.follow(problem, 1e-3, 1.0)
+    assert branch.converged and branch["amplitude"][-1] == pytest.approx(1.0)
+    moved = branch.coefficients(len(branch["amplitude"]) - 1)[:, 0].real
+    assert moved[2] > 10.0
+    assert 100.0 * moved[0] + 8.0 * moved[3] == pytest.approx(-soft * moved[2], rel=1e-3)  # friction's two ends
+
+
+def test_closed_contact_holds_a_body_far_from_rest() -> None:
+    """A body of which a static load closes a stop, 1e5 motions from where the stop is free: a linear response."""
+    M, C, K = np.eye(2), 0.5 * np.eye(2), 3e3 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + np.diag([1e-9, 0.0])
+    stop, push = np.diag([50.0, 0.0]), np.array([0.0, 1e-4])
+    contact = fw.Contact("unilateral_spring", np.array([[1.0, 0.0]]), {"normal_stiffness": [50.0], "gap": [0.0]})
+    model = fw.Model(M, K, C, [contact])
+    shape = fw.linear_modes(fw.Model(M, K + stop, C), 1)[0]
+    loads = {0: np.array([0.0, 100.0]), 1: push}
+    branch = fw.follow(fw.ForcedResponse(model, fw.Harmonics(range(4), 256), loads, 1.0, 1, shape), 3.0, 8.0)
+    assert branch.converged
+    for k, omega in enumerate(branch["omega"]):
+        q = branch.coefficients(k)
+        expected = np.linalg.solve(K + stop - omega**2 * M + 1j * omega * C, push)
+        assert q[0, 0] == pytest.approx(2.0)
+        assert np.hypot(q[1, 1], q[1, 2]) == pytest.approx(abs(expected[1]), rel=1e-8)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: What a reason begins with where no step led on.
 TOO_SMALL = "step too small"
+#: What a reason says where nothing holds a body, as `src/hb/mean_position.cpp` words it.
+FREE = "mean position is free"
 #: Ends of a branch that has left what it was asked for, as `src/solve` words them.
 RETURNS = re.compile("comes back to|back onto itself|a closed loop")
 #: What is said of a mode that loses no energy.

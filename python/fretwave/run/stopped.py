@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..analyses.parts.context import Outcome
 from ..errors import NotConverged
-from ..hb.suspects import LEADS_OVER
+from ..hb.suspects import FREE, LEADS_OVER
 
 #: A loop may end within itself, and an internal resonance lead to another mode.
 OVER = "steps that pass over loops (--petsc '-fw_branch_other 1e300')"
@@ -37,7 +37,7 @@ def _advice(name: str, reason: str) -> str:
         return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
     if "does not fit" in reason:
         return "more memory or ranks, fewer harmonics or component modes, or fewer contact pairs"
-    if "mean position is free" in reason:
+    if FREE in reason:
         return "hold the structure where contact alone cannot (a spring, an axial stop), or load its contact more"
     if "linear solve" in reason or "LINEAR_SOLVE" in reason:
         return (

@@ -13,7 +13,7 @@ from ...case.analysis_tables import StepSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...errors import InputError
-from ...hb.suspects import RETURNS, TOO_SMALL, lossless, suspects, vanishing
+from ...hb.suspects import FREE, RETURNS, TOO_SMALL, lossless, suspects, vanishing
 from ...mpi.log import event
 from ...mpi.spread import Spread
 from ...post.contact_history import MEASURED
@@ -81,6 +81,8 @@ def suspected(branch: Continuation, stiffness: float, units: UnitSystem) -> str:
     ----------
     stiffness : of the structure [force/length]
     """
+    if FREE in branch.reason:
+        return ""
     ask = vanishing if branch.reason.startswith(TOO_SMALL) else lossless if RETURNS.search(branch.reason) else None
     anchor = branch.anchor
     seen = ask(branch.problem, anchor) if ask and anchor is not None else ""
