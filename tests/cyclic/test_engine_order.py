@@ -213,6 +213,20 @@ def test_peaks_of_blades_take_each_at_its_own_frequency():
 
 
 @pytest.mark.ranks(1)
+def test_a_blade_does_not_take_the_peak_of_the_one_that_is_observed():
+    """Its largest point is where the observed blade's peak was located, its own peak 0.004 further on."""
+    omega = np.array([1.9, 1.95, 2.0, 2.03, 2.1])
+    shape = lambda at: 1 / np.sqrt(1 + 400 * (omega - at) ** 2)  # noqa: E731
+    event = np.array(["", "", "peak", "", ""])
+    table = {"level": np.ones(5), "omega": omega, "amplitude": shape(2.0), "event": event}
+    tuned = {"level": np.ones(5), "frequency_hz": omega / (2 * np.pi), "amplitude": shape(2.0), "event": event}
+    blades = np.column_stack([shape(2.0), 0.5 * shape(2.0), shape(2.004)])
+    peaks, each = blade_tables(table, blades, tuned)
+    assert each["amplitude"].tolist() == [1.0, 0.5, pytest.approx(1.0, rel=SOLVED)]
+    assert 2 * np.pi * each["frequency_hz"] == pytest.approx(np.array([2.0, 2.0, 2.004]), rel=SOLVED)
+
+
+@pytest.mark.ranks(1)
 def test_a_blade_that_moves_more_where_the_range_ends_is_told():
     """Of level 1 a blade rises to 5 at the end, beside a peak of 3; of level 2 no blade has a peak."""
     omega = np.linspace(1, 4, 301)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..arrays import Array
-from .largest import largest
+from .largest import ALIKE, largest
 from .response_peaks import NOWHERE, Peak, amplitude_peak
 
 
@@ -68,11 +68,15 @@ def beyond(table: Mapping[str, Array], blades: Array, each: Mapping[str, Array])
 
 def _peak(table: Mapping[str, Array], level: float, omega: Array, amplitude: Array) -> Peak:
     rows = table["level"] == level
-    return (
-        amplitude_peak(omega[rows], amplitude[rows], table["event"][rows] if "event" in table else None)
-        if rows.any()
-        else NOWHERE
-    )
+    if not rows.any():
+        return NOWHERE
+    own = "event" in table and _alike(amplitude[rows], table["amplitude"][rows])
+    return amplitude_peak(omega[rows], amplitude[rows], table["event"][rows] if own else None)
+
+
+def _alike(amplitude: Array, observed: Array) -> bool:
+    """A blade's curve is that of the observed dof, to a factor: its peak is where that one's was located."""
+    return bool(np.allclose(amplitude * observed.max(), observed * amplitude.max(), rtol=ALIKE, atol=0.0))
 
 
 def whitehead(sectors: int) -> float:

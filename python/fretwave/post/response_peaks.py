@@ -40,7 +40,7 @@ def located_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_]) ->
 def amplitude_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_] | None = None) -> Peak:
     """Largest amplitude of a motion that need not be observed (a blade of many); none at the ends of the range.
 
-    Where it lies on the located peak of the observed dof, it is that point. Elsewhere 1/a^2, which is almost a parabola
+    Where it lies on a located peak of its own (`event`), it is that point. Elsewhere 1/a^2, which is almost a parabola
     of the frequency at a resonance, is drawn through the three points around the largest one. Across the top of a
     response the frequency never turns round, even where the curve folds.
     """
