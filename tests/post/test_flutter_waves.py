@@ -47,3 +47,19 @@ def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
     (cycle,) = wave["limit_cycles"]
     assert cycle["folds"] == [1.0, 1.2] and cycle["stable"] is None and wave["verdict"] == "bounded"
     assert "runs back between 1 and 1.2 mm" in words(wave, "mm")
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(
+    ("zeta", "said"),
+    [
+        ([0.01, 0.03, 0.02, 0.01], "stable at every amplitude up to 3 m"),
+        ([-0.01, -0.03, -0.02, -0.01], "grows at every amplitude up to 3 m"),
+        ([-0.01, 0.02, -0.01, 0.01], "growth without bound beyond"),
+    ],
+)
+def test_a_branch_that_comes_back_is_judged_where_its_amplitude_is_largest(zeta, said):
+    columns = {"nodal_diameter": np.ones(4), "amplitude": np.array([1.0, 2.0, 3.0, 0.25]), "zeta": np.array(zeta)}
+    event = np.array(["", "zero_damping" if min(zeta) < 0 < max(zeta) else "", "fold", ""])
+    (wave,) = describe_waves({**columns, "frequency_hz": np.full(4, 10.0), "event": event}, [1])
+    assert wave["last_amplitude"] == 3.0 and said in words(wave, "m")

@@ -20,9 +20,10 @@ def describe_waves(table: Mapping[str, Any], diameters: Sequence[int]) -> list[d
     Returns
     -------
     list of dict
-        nodal_diameter; frequency_hz and zeta at the smallest amplitude; largest_zeta and at_amplitude; last_amplitude;
-        verdict, of :func:`verdict`; limit_cycles, each as :func:`limit_cycles` gives it with its nodal_diameter
-        and, where the branch runs back there, the amplitudes of the folds around it (None elsewhere).
+        nodal_diameter; frequency_hz and zeta at the smallest amplitude; largest_zeta and at_amplitude; last_amplitude,
+        up to which the branch has been, also if it comes back from there; verdict, of :func:`verdict`; limit_cycles,
+        each as :func:`limit_cycles` gives it with its nodal_diameter and, where the branch runs back there, the
+        amplitudes of the folds around it (None elsewhere).
     """
     columns = np.asarray(table["nodal_diameter"])
     rows = {diameter: np.flatnonzero(columns == diameter) for diameter in diameters}
@@ -44,8 +45,8 @@ def _wave(table: Mapping[str, Any], diameter: int, rows: npt.NDArray[np.intp]) -
         "zeta": float(zeta[0]),
         "largest_zeta": float(zeta[top]),
         "at_amplitude": float(amplitude[top]),
-        "last_amplitude": float(amplitude[-1]),
-        "verdict": verdict(zeta),
+        "last_amplitude": float(amplitude.max()),
+        "verdict": verdict(zeta, int(np.argmax(amplitude))),
         "limit_cycles": cycles,
     }
 
@@ -59,25 +60,30 @@ def _folds(part: Mapping[str, Any], point: int) -> list[float] | None:
     return sorted([float(part["amplitude"][before[-1]]), float(part["amplitude"][behind[0]])])
 
 
-def verdict(zeta: npt.ArrayLike) -> str:
+def verdict(zeta: npt.ArrayLike, top: int = -1) -> str:
     """From the signs of the damping along a branch that begins with the contact stuck.
+
+    Parameters
+    ----------
+    top : point of the largest amplitude, the last one unless the branch comes back from there
 
     Returns
     -------
     str
         ``stable``: damped at every amplitude. ``unbounded``: fed at every amplitude. ``bounded``: fed at first, damped
-        at the end. ``bounded below``: damped in between only, and beyond the last limit cycle without bound.
+        at the top. ``bounded below``: damped in between only, and beyond the last limit cycle without bound.
         ``stable below``: damped at first. ``neutral``: neither.
     """
     signs = np.sign(np.where(np.abs(zeta) > NO_DAMPING, zeta, 0.0))
-    signs = signs[signs != 0]
+    before_top = signs[: top % len(signs) + 1]
+    at_top, signs = before_top[before_top != 0][-1:], signs[signs != 0]
     if not len(signs):
         return "neutral"
     if (signs > 0).all() or (signs < 0).all():
         return "stable" if signs[0] > 0 else "unbounded"
     if signs[0] > 0:
         return "stable below"
-    return "bounded" if signs[-1] > 0 else "bounded below"
+    return "bounded" if (at_top > 0).any() else "bounded below"
 
 
 def words(wave: Mapping[str, Any], unit: str) -> str:
