@@ -205,6 +205,15 @@ def test_damping_that_is_the_same_throughout_has_no_peak(tmp_path, damping):
     assert "largest" not in line.partition("fold")[0] and f"damping {100 * damping:.4g} % throughout" in line
 
 
+@pytest.mark.ranks(1)
+def test_a_branch_that_comes_back_is_told_up_to_where_it_was():
+    """Of 1 to 3 m and back to 0.25 m "a 1 to 0.25 m" was said."""
+    amplitude, zeta = np.array([1.0, 3.0, 0.25]), np.array([0.01, 0.02, 0.01])
+    table = {"amplitude": amplitude, "zeta": zeta, "zeta_error": 0 * zeta, "wall_s": 0 * zeta}
+    (line,) = summarise("mode", {**table, "event": ["", "fold", ""]}, [], "m")
+    assert "3 points, a 0.25 to 3 m" in line
+
+
 @pytest.mark.parametrize("late", [False, True])
 def test_the_close_up_of_the_folds_covers_no_point(tmp_path, late):
     """Of a branch whose folds are early, and of one that slips, and is damped, at its end."""

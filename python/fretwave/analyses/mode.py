@@ -273,7 +273,7 @@ def summarise(name: str, table: Mapping[str, Any], cycles: Sequence[Mapping[str,
     top, changes = most_damped(zeta), varies(zeta)
     folds = sum("fold" in event.split() for event in table["event"])
     lines = [
-        f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} {unit},"
+        f"{name}: {len(zeta)} points, a {min(amplitude):.4g} to {max(amplitude):.4g} {unit},"
         f" {'largest ' * changes}damping {100 * without_rounding(zeta[top]):.4g} %"
         f" {f'at a = {amplitude[top]:.4g} {unit}' if changes else 'throughout'},"
         f" {counted(folds, 'fold')},"
