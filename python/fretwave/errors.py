@@ -81,6 +81,10 @@ class InputError(FretwaveError):
     exit_code = EXIT_BAD_INPUT
 
 
+class NothingMoves(InputError):
+    """Contact that sticks leaves no degree of freedom to move, so that the modes with it are none."""
+
+
 class NotConverged(FretwaveError):
     """A solver stopped early; what was found until then is kept."""
 

@@ -13,6 +13,9 @@ from models.solved_case import tables_of
 from mpi4py import MPI
 from tolerances import SOLVED, TIGHT
 
+import fretwave.model.modes
+from fretwave.errors import InputError
+
 N = 6
 DEVIATIONS = np.array([0.02, -0.01, 0.03, 0.0, -0.02, 0.01])
 #: A ring of masses on ground springs, each under a rubbing pair that holds it where it does not slide.
@@ -174,3 +177,40 @@ def test_check_takes_what_a_run_solves(name, tmp_path, capfd):
     expected = np.sqrt(squares[1] if "mistuned" in name else 2.0) / (2 * np.pi)
     assert f"with contact as at rest: {expected:.6g} Hz" in said
     assert call("run", path, "--no-plots", "-q", "--out", tmp_path / "run") == 0
+
+
+FORCED = """
+[[analysis]]
+name = "forced"
+type = "forced"
+force = { mass = 1.0 }
+observe = "mass"
+levels = [0.1]
+harmonics = 1
+frequency = [0.1, 0.5]
+"""
+OTHER_TROUBLE = {
+    "mode": ONE + RUB + mode("mode", ""),
+    "mode at rest": ONE + PRELOAD + RUB + mode("mode", ""),
+    "forced": ONE + RUB + FORCED,
+    "linear": ONE + RUB + '[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = 1\n',
+    "wheel": RING + RUB + mode("mode", "wheel = true\nnodal_diameter = 1\n"),
+}
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("name", OTHER_TROUBLE)
+def test_other_trouble_with_stuck_modes_is_told(name, tmp_path, capfd, monkeypatch):
+    """It was taken for "nothing to move", and the run went on from the modes without contact, exit 0."""
+    own = fretwave.model.modes.linear_modes
+
+    def troubled(model, count=6, contact="stuck", near=None):
+        if contact == "stuck" and model.contacts:
+            raise InputError("the factor is too large")
+        return own(model, count, contact, near)
+
+    monkeypatch.setattr(fretwave.model.modes, "linear_modes", troubled)
+    path = tmp_path / "case.toml"
+    path.write_text(OTHER_TROUBLE[name], encoding="utf-8")
+    assert call("run", path, "--no-plots", "-q", "--out", tmp_path / "run") == 2
+    assert "the factor is too large" in capfd.readouterr().err

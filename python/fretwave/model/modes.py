@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from .. import _core
 from ..arrays import Array
-from ..errors import InputError, PetscError
+from ..errors import InputError, NothingMoves, PetscError
 from ..files.memory import machine_memory, size
 from ..given import whole
 from ..mpi.gather import on_all_ranks
@@ -23,6 +23,9 @@ from .model import Model
 #: Entries of a row from which a model counts as solid elements, and how many times their factors have as many (twelve
 #: of L and of U each: from above, a wheel of 36 x 20,646 dofs counts 22 GB and is solved on two ranks of 24).
 SOLID, FILLED = 60, 24
+
+#: The core's words where stuck contact holds every degree of freedom.
+NOTHING_LEFT = "the stuck contact leaves no degree of freedom"
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,8 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     FretwaveError
         Fewer converge than there are: how many, and the option that helps; or the model's factor is larger than the
         memory.
+    NothingMoves
+        Stuck contact leaves no degree of freedom. It is an InputError.
     InputError
         `near`, or stuck contact that is rigid, where K is not symmetric.
 
@@ -92,6 +97,8 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     _check_factor(model)
     try:
         found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
+    except InputError as error:  # on all ranks
+        raise (NothingMoves(*error.args) if error.what == NOTHING_LEFT else error) from None
     except PetscError as error:
         if model.comm.size > 1 and not all_ranks_failed(model.comm):
             raise  # of some ranks alone: the others wait in the solver

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...case.wheel import on_wheel
 from ...columns import MODAL_UNIT, Column
-from ...errors import InputError
+from ...errors import NothingMoves
 from ...model.sectors import Term, in_wave
 from ...post.engine_orders import exciting, margins
 from .asymptotes import MORE_MODES, limit_model, most_like, planes_of, sector_phase
@@ -103,7 +103,7 @@ def _modes(context: AnalysisContext[LinearAnalysis], case: Case, limit: str, dia
         count = _count(context, MORE_MODES if sought else 0)
         try:
             modes = linear_modes(model, min(model.n_dof, count + sought))
-        except InputError:
+        except NothingMoves:
             if limit != "stuck" or context.analysis.contact == ["stuck"]:
                 raise
             context.console.line(f"{context.name}: contact that sticks leaves nothing to move")

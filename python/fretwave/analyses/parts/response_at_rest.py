@@ -14,7 +14,7 @@ from ...arrays import Complex
 from ...case.flow import with_flow
 from ...case.harmonic import nodal_diameter
 from ...case.observed import label_of, unit_of
-from ...errors import InputError
+from ...errors import InputError, NothingMoves
 from ...model.law_info import OPEN
 from ...model.sectors import by_sector
 from ...model.wheel_matrix import entries_of
@@ -133,7 +133,7 @@ def _peaks(context: Forced, linear: Linear) -> list[LinearMode]:
     count = MOST_PEAKS if context.case.wheel is None else max(MOST_PEAKS, 2 * context.wheel.sectors)
     try:
         modes = nearest_modes(context, 0.5 * (low + high), min(context.model.n_dof, count))
-    except InputError:  # contact that sticks leaves nothing to move
+    except NothingMoves:
         return []
     inside = [mode for mode in modes if low <= mode.omega <= high and linear.drives(mode)]
     return sorted(inside, key=linear.peak, reverse=True)[:MOST_PEAKS]

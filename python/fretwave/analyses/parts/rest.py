@@ -13,7 +13,7 @@ from ...arrays import Array
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, nodal_diameter
 from ...case.schema import PreloadSection
-from ...errors import InputError
+from ...errors import InputError, NothingMoves
 from ...model.contact import Contact
 from ...model.law_info import Role
 from ...model.laws import own_load
@@ -111,7 +111,7 @@ def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
     case, diameters = (context.case, nodal_diameter(context.analysis)) if wheel is None else (context.tuned, 0)
     try:
         mode = _lowest(case, context, "stuck", diameters)
-    except InputError:
+    except NothingMoves:
         mode = _lowest(case, context, "free", diameters)
     if wheel is None:
         return mode
@@ -186,7 +186,7 @@ def stuck_or_no_modes(context: AnalysisContext[AnalysisSection], count: int) -> 
     """None where contact that sticks leaves nothing to move. Collective."""
     try:
         return modes_at_rest(context, count)
-    except InputError:
+    except NothingMoves:
         return []
 
 

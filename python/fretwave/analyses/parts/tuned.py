@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...case.harmonic import HarmonicSection, nodal_diameter
-from ...errors import InputError
+from ...errors import NothingMoves
 from ...model.structure import WHOLE
 from .context import AnalysisContext
 from .rest import rest_state
@@ -63,7 +63,7 @@ def nearest_or_free(context: AnalysisContext[Any], omega: float, count: int) -> 
     """The same with contact that sticks or, where that leaves nothing to move, without it. Collective."""
     try:
         return nearest_modes(context, omega, count)
-    except InputError:
+    except NothingMoves:
         return nearest_modes(context, omega, count, "free")
 
 
