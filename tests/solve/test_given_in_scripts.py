@@ -178,3 +178,17 @@ def test_a_destroyed_reduction_says_so() -> None:
     ):
         with pytest.raises(fw.InputError, match="the reduction has been destroyed"):
             use()
+
+
+def test_reports_outside_the_range_are_told(mode: fw.NonlinearMode) -> None:
+    """They were left out without a word; those on the ends, and within, are met."""
+    branch = fw.follow(mode, 0.01, (0.01, 0.1), report_at=[0.001, 0.01, 0.05, 0.1, 3.0])
+    assert [text.split(":")[0] for text in branch.missed] == ["report at 0.001", "report at 3"]
+    assert "outside the range, 0.01 to 0.1" in branch.missed[0]
+    assert branch["amplitude"][branch.met("report")] == pytest.approx([0.05, 0.1], rel=1e-9)
+
+
+@pytest.mark.parametrize("given", [[np.nan], ["tip"], 0.05, [[0.05]], [np.inf]], ids=str)
+def test_reports_are_a_list_of_numbers(given: Any, mode: fw.NonlinearMode) -> None:
+    with pytest.raises(fw.InputError, match="report_at"):
+        fw.follow(mode, 0.01, 0.1, report_at=given)

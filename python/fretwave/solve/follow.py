@@ -51,7 +51,7 @@ def follow(
     steps : StepControl, optional
         Lengths of its steps.
     report_at : sequence of float
-        Amplitudes or omegas at which points are located.
+        Amplitudes or omegas at which points are located; `Branch.missed` tells those outside the range.
     unknowns : bool
         Keep the unknowns of all points (2 x 8 bytes for each of every point's), for `Branch.unknowns` and
         `Branch.coefficients`.
@@ -104,7 +104,8 @@ def follow(
     y0: PETSc.Vec = start if own else problem.initial(float(start))
     first = problem.parameter(y0) if own else float(start)
     low, high, upwards = _range(first, stop)
-    settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": report_at, "upwards": upwards}
+    reports = _reports(report_at)
+    settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": reports, "upwards": upwards}
     if accuracy is None:
         continuation = Continuation(problem, y0, **settings)
     else:
@@ -122,7 +123,8 @@ def follow(
         rows.append(problem.model.comm.bcast({**row_of(now, point, len(rows), errors), **seen}))
         if tell is not None:
             tell(rows[-1])
-    ended = continuation.converged, continuation.reason, continuation.missed, continuation.started
+    missed = [*continuation.missed, *_outside(reports, low, high, [row[problem.meaning.parameter] for row in rows])]
+    ended = continuation.converged, continuation.reason, missed, continuation.started
     trace.close(continuation.largest if isinstance(continuation, RefiningContinuation) else problem)
     continuation.destroy()
     if not own:
@@ -187,3 +189,22 @@ def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, floa
         fix = "start within it, or give the end alone: stop=high"
         raise InputError("the branch begins outside its range", None, first, f"{low:g} to {high:g}", fix)
     return low, high, None
+
+
+def _reports(given: Sequence[float]) -> list[float]:
+    """Parameter values, as numbers."""
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        values = np.full((), np.nan)
+    if values.ndim != 1 or not np.isfinite(values).all():
+        fix = "give for example report_at=[0.1, 1.0]"
+        raise InputError("no point can be located there", "report_at", repr(given), "a list of numbers", fix)
+    return [float(value) for value in values]
+
+
+def _outside(reports: Sequence[float], low: float, high: float, met: Sequence[float]) -> list[str]:
+    """What is said of reports outside the range; a branch that folds back over its first end may have met one."""
+    far = [value for value in reports if not low * (1 - AT_AN_END) <= value <= high * (1 + AT_AN_END)]
+    unmet = [value for value in far if not np.isclose(met, value, rtol=AT_AN_END, atol=0.0).any()]
+    return [f"report at {value:.6g}: outside the range, {low:.6g} to {high:.6g}" for value in unmet]
