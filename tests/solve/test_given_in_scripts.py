@@ -192,3 +192,28 @@ def test_reports_outside_the_range_are_told(mode: fw.NonlinearMode) -> None:
 def test_reports_are_a_list_of_numbers(given: Any, mode: fw.NonlinearMode) -> None:
     with pytest.raises(fw.InputError, match="report_at"):
         fw.follow(mode, 0.01, 0.1, report_at=given)
+
+
+SECTOR = fw.Sector(np.eye(2), np.diag([2.0, 1.0]), 6)
+TIED = fw.Sector.from_faces(np.eye(3), np.diag([1.0, 2.0, 1.0]), [0], [2], 6)
+
+
+@pytest.mark.parametrize("sector", [SECTOR, TIED], ids=["alone", "tied"])
+@pytest.mark.parametrize(
+    "q", [1.0, [1.0], [1.0, 2.0, 3.0], [[1.0, 2.0]], np.eye(2), "ab", [np.nan, 1.0], None], ids=str
+)
+def test_a_wave_is_given_by_the_dofs_of_a_sector(q: Any, sector: fw.Sector) -> None:
+    """Three numbers went round the wheel as a sector of three dofs."""
+    for found in (sector.wave, sector.expand):
+        with pytest.raises(fw.InputError, match=r"do not fit the sector[\s\S]*\(2,\), finite"):
+            found(q, 1)
+
+
+def test_a_wave_has_a_whole_number_of_diameters_and_an_own_mode(other: fw.LinearMode) -> None:
+    for found in (SECTOR.wave, SECTOR.expand):
+        assert np.shape(found([1.0, 2j], 1, order=3)) in ((6, 2), (2,))
+        for diameters, order in ((1.5, 1), ("1", 1), (1, 0.5)):
+            with pytest.raises(fw.InputError, match="whole number"):
+                found([1.0, 2.0], diameters, order)  # type: ignore[arg-type]
+    with pytest.raises(fw.InputError, match="do not fit the sector"):
+        SECTOR.around(other, 1)

@@ -27,6 +27,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..errors import InputError
+from ..given import whole
 from ..model.contact import Contact
 from ..model.model import Model
 from ..model.modes import LinearMode
@@ -161,18 +162,29 @@ class Sector:
 
     def wave(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:
         """Complex amplitudes (N, n_dof) of harmonic `order` in all sectors from those of sector 0, (n_dof,)."""
-        return wave(q, nodal_diameter * order, self.sectors)
+        return wave(self._motion(q), _index(nodal_diameter, order), self.sectors)
 
     def around(self, mode: LinearMode, nodal_diameter: int) -> LinearMode:
         """A wave of one sector as a mode of the wheel (unit modal mass of the wheel when undamped)."""
-        return wave_mode(mode, nodal_diameter, self.sectors)
+        self._motion(mode.shape)
+        return wave_mode(mode, _index(nodal_diameter), self.sectors)
 
     def expand(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:
         """Complex amplitudes (n_full,) of harmonic `order` on the dofs with both faces, from those (n_dof,)."""
-        if not self.ties:
-            return np.asarray(q, dtype=complex)
-        theta = 2 * np.pi * order * nodal_diameter / self.sectors
-        return in_wave(self.ties, q, theta)
+        motion, theta = self._motion(q), 2 * np.pi * _index(nodal_diameter, order) / self.sectors
+        return in_wave(self.ties, motion, theta) if self.ties else motion
+
+    def _motion(self, q: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+        """Complex amplitudes (n_dof,) of sector 0."""
+        try:
+            motion = np.asarray(q, dtype=complex)
+        except (TypeError, ValueError):
+            motion = np.full((), np.nan + 0j)
+        if motion.shape != (self.n_dof,) or not np.isfinite(motion).all():
+            given = f"{np.shape(q)}{'' if np.isfinite(motion).all() else ', not finite'}"
+            fix = "give one number for each dof of one sector"
+            raise InputError("the amplitudes do not fit the sector", None, given, f"({self.n_dof},), finite", fix)
+        return motion
 
 
 def wave(q: npt.ArrayLike, index: int, sectors: int) -> npt.NDArray[np.complex128]:
@@ -185,6 +197,15 @@ def wave_mode(mode: LinearMode, nodal_diameter: int, sectors: int) -> LinearMode
     """A wave of one sector as a mode of the wheel (unit modal mass of the wheel when undamped)."""
     phi = wave(mode.shape + 1j * mode.imaginary, nodal_diameter, sectors).ravel() / np.sqrt(sectors)
     return LinearMode(mode.omega, mode.beta, phi.real.copy(), phi.imag.copy())
+
+
+def _index(nodal_diameter: int, order: int = 1) -> int:
+    """Spatial index of a harmonic of a wave."""
+    diameters, harmonic = whole(nodal_diameter), whole(order)
+    if diameters is None or harmonic is None:
+        given, expected = f"nodal_diameter={nodal_diameter!r}, order={order!r}", "a whole number each"
+        raise InputError("a wave has a whole number of nodal diameters", None, given, expected, "round them")
+    return diameters * harmonic
 
 
 def _check_changes(letter: str, own: Sequence[Any], sectors: int, n_dof: int) -> None:
