@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -67,6 +69,27 @@ def test_a_failure_leaves_the_old_file(tmp_path: Path, skewed: fe.Mesh) -> None:
         grid.part(skewed.nodes, (skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON))
         grid.point_field("short", [skewed.nodes], [0, 1])
     assert path.read_text() == "old" and [entry.name for entry in tmp_path.iterdir()] == ["grid.vtkhdf"]
+
+
+ANOTHER = """
+import sys
+from pathlib import Path
+from fretwave.view.vtkhdf import VERTEX, GridFile
+
+with GridFile(Path(sys.argv[1]), [0.0]) as grid:
+    grid.part([[7.0, 0, 0]], ([[0]], VERTEX))
+"""
+
+
+def test_two_processes_may_write_one_file(tmp_path: Path) -> None:
+    """Both wrote to one name beside it: the other was refused, or its file was taken. The last to end is there."""
+    path = tmp_path / "grid.vtkhdf"
+    with GridFile(path, [0.0, 1.0]) as grid:
+        grid.part([[1.0, 0, 0], [2.0, 0, 0]], ([[0], [1]], VERTEX))
+        subprocess.run([sys.executable, "-c", ANOTHER, path], check=True, timeout=60)
+        assert read_step(path, 0)["points"].tolist() == [[7.0, 0.0, 0.0]]
+    assert read_step(path, 1)["points"][:, 0].tolist() == [1.0, 2.0]
+    assert [entry.name for entry in tmp_path.iterdir()] == ["grid.vtkhdf"]
 
 
 def test_linear_cells_fill_the_same_volume(skewed: fe.Mesh) -> None:

@@ -34,7 +34,7 @@ def write(branch: Branch, path: Path) -> None:
     import h5py
 
     curves = branch.curves
-    with replaced(path) as fresh, h5py.File(fresh, "w", track_order=True) as file:
+    with replaced(path, own=True) as fresh, h5py.File(fresh, "w", track_order=True) as file:
         for column in [column for column in branch.columns if column.name != "point"]:
             _put(file, column, branch[column.name], ["point"])
         _put(file, _SCALARS, curves.values, ["point", "scalar"])

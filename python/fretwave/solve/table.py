@@ -88,7 +88,7 @@ class Table:
 
     def to_csv(self, path: str | Path) -> None:
         """Write it as the table of a run is written: shortest text that gives the same numbers back."""
-        with replaced(Path(path)) as fresh:
+        with replaced(Path(path), own=True) as fresh:
             text = "".join([header_line(self.columns), *(row_line(self.columns, row) for row in self)])
             fresh.write_text(text, encoding="utf-8")
 

@@ -9,6 +9,7 @@ Plain serial h5py. ParaView reads such files from version 5.12 on (VTK 9.3).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ import numpy.typing as npt
 from ..arrays import AnyArray, Array, Indices, IntArray
 from ..errors import InputError
 from ..files.streams import behind, refuse_stream
-from ..files.whole import beside, take_place, told
+from ..files.whole import replaced
 from ..model.cells import KINDS
 from ..texts import display
 from ..units import ATTRIBUTE, SI, UnitSystem
@@ -58,8 +59,8 @@ class GridFile:
         refuse_stream(path)
         path = behind(path)
         self.path, self.steps = path, len(values)
-        self._unfinished = beside(path)
-        self._file = _create(self._unfinished)
+        self._place = replaced(path, own=True, keep_suffix=True)
+        self._file = _create(self._place.__enter__())
         self._file.attrs[ATTRIBUTE] = units.name
         self._root = self._file.create_group("VTKHDF", track_order=True)
         self._root.attrs["Version"] = np.array(VERSION, dtype="i8")
@@ -179,19 +180,20 @@ class GridFile:
     def __enter__(self) -> GridFile:
         return self
 
-    def __exit__(self, kind: object, *_: object) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        with ExitStack() as ending:
+            ending.push(self._place)
+            ending.callback(self._file.close)
+            if error is not None:
+                raise error
+            self._complete()
+
+    def _complete(self) -> None:
         missing = [name for name, rows in self._missing.items() if rows]
-        if kind is None and not missing:
-            parts = len(self._root["NumberOfPoints"])
-            self._root["Steps/NumberOfParts"] = np.full(self.steps, parts, dtype="i8")
-        self._file.close()
-        if kind is None and not missing:
-            with told(self.path):
-                take_place(self._unfinished, self.path)
-        else:
-            self._unfinished.unlink(missing_ok=True)
-        if kind is None and missing:
+        if missing:
             raise ValueError(f"fields not written everywhere: {', '.join(missing)}")
+        parts = len(self._root["NumberOfPoints"])
+        self._root["Steps/NumberOfParts"] = np.full(self.steps, parts, dtype="i8")
 
     @staticmethod
     def _table(group: h5py.Group, name: str, columns: int, dtype: str, rows: int = 0) -> Any:
