@@ -25,7 +25,7 @@ from fretwave.run.runner import resume_run, run_case
 
 SECTORS, OMEGA = 5, 1.7
 INFLUENCE = {0: 0.02 - 0.06j, 1: -0.1 + 0.02j, -1: 0.12 + 0.05j, 2: 0.01 - 0.005j}
-#: The chain of REFERENCE as a case: a mass on its ground spring, a Jenkins element to the next one, and the flow.
+#: The chain as a case: a mass on its ground spring, a Jenkins element to the next one, and the flow.
 TEXT = f"""
 [model]
 dofs = ["mass", "next"]

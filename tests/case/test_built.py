@@ -227,7 +227,7 @@ def test_reduction_is_reported(run: Path) -> None:
 
 
 def test_error_at_an_amplitude_is_the_difference_to_the_unreduced_model(write, tmp_path: Path) -> None:
-    """Issue 3: estimated at one nonlinear point, in partial slip; within a factor 2 of the true change."""
+    """Estimated at one nonlinear point, in partial slip; within a factor 2 of the true change."""
     out = [tmp_path / "whole", tmp_path / "reduced"]
     omega = []
     for folder, text in zip(out, ("", "[reduction]\nmodes = 8\nerror_at = 2.1e-6\n")):

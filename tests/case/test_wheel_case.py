@@ -126,7 +126,7 @@ def dense_wheel(deviations):
 
 @pytest.mark.ranks(1, 2, 3, 4)
 def test_tuned_wheel_follows_its_sector(comm, tmp_path):
-    """Issue 4: omega and beta to 1e-8 on any number of ranks, forward and backward; the unfolding vanishes."""
+    """omega and beta to 1e-8 on any number of ranks, forward and backward; the unfolding vanishes."""
     found, out = run(comm, tmp_path, sector="nodal_diameter = 2", wheel=WHEEL, backward=WHEEL.replace("2", "-2"))
     omega = found["sector"]["omega"][0]
     for name in ("wheel", "backward"):
@@ -143,7 +143,7 @@ def test_tuned_wheel_follows_its_sector(comm, tmp_path):
 
 @pytest.mark.ranks(1)
 def test_every_point_of_the_wheel_lies_on_the_branch_of_its_sector(comm, tmp_path):
-    """Issue 4, at every point: the sector's branch is taken at the wheel's amplitudes."""
+    """At every point: the sector's branch is taken at the wheel's amplitudes."""
     wheel = run(comm, tmp_path, wheel=WHEEL)[0]["wheel"]
     inside = [float(a) for a in np.unique(wheel["amplitude"][1:-1])]
     sector = run(comm, tmp_path, f"sector.report_at={inside}", sector="nodal_diameter = 2")[0]["sector"]
@@ -335,7 +335,7 @@ def test_a_whole_structure_is_no_wheel(tmp_path):
 
 @pytest.mark.ranks(1)
 def test_committed_wheel_lies_on_the_branch_of_its_sector(comm, tmp_path):
-    """Issue 4 on the lumped blisk, at every point from stick to slip: the sector solved from sector 0 of the wheel."""
+    """On the lumped blisk, at every point from stick to slip: the sector solved from sector 0 of the wheel."""
     path = Path(__file__).parents[2] / "cases" / "blisk_lumped" / "case.toml"
     options = RunOptions(tmp_path, ["mode_wheel.amplitude=[1e-4,3e-3]"], ["mode_wheel"], quick=True, plots=False)
     assert run_case(path, options, comm) == 0

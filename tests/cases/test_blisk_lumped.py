@@ -52,7 +52,7 @@ def stiffness(case, options) -> np.ndarray:
 
 
 def jenkins(a: float, kt: float, limit: float) -> complex:
-    """REFERENCE: complex stiffness of a Jenkins element at relative amplitude a."""
+    """Complex stiffness of a Jenkins element at relative amplitude a."""
     if a <= limit / kt:
         return complex(kt)
     th = np.arccos(1 - 2 * limit / (kt * a))
@@ -135,7 +135,7 @@ def test_forward_and_backward_waves_are_alike_without_rotation(case, comm):
 
 
 def test_the_full_wheel_follows_the_branch_of_one_sector(case, comm):
-    """Issue 4: 24 sectors, 96 dofs, omega and beta to 1e-8 (1e-11 here) from stick to slip; the unfolding vanishes."""
+    """24 sectors, 96 dofs, omega and beta to 1e-8 (1e-11 here) from stick to slip; the unfolding vanishes."""
     sector, h, reports = case.sector(), fw.Harmonics((1, 3), 480), [1e-4, 2.1e-4, 3e-4, 1e-3]
     with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
         stuck = fw.linear_modes(model, FAMILY)[-1]

@@ -36,7 +36,7 @@ def test_jacobian_of_a_mode_is_exact(law, method):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_mean_block_is_regular_when_stuck_under_preload(law):
-    """DESIGN fact 3: a body held by contact alone. The mean's block is the stuck stiffness, kn and kt, not singular."""
+    """A body held by contact alone. The mean's block is the stuck stiffness, kn and kt, not singular."""
     contact = pair(law, np.vstack([np.eye(3), np.diag([-1.0, 1.0, 1.0])]))
     model = fw.Model(np.eye(3), np.zeros((3, 3)), None, [contact], MPI.COMM_WORLD)
     start = fw.linear_modes(model, 1, "stuck")[0]
@@ -49,7 +49,7 @@ def test_mean_block_is_regular_when_stuck_under_preload(law):
 
 
 def unilateral(comm, highest, samples=1024):
-    """REFERENCE: k = 1, kn = 3, m = 1, zero gap, no friction."""
+    """k = 1, kn = 3, m = 1, zero gap, no friction."""
     contact = pair(B=((1.0,), (0.0,), (0.0,)), normal_stiffness=3.0, friction_coefficient=0.0, normal_load=0.0)
     model = fw.Model([[1.0]], [[1.0]], None, [contact], comm)
     return mode_problem(model, range(highest + 1), samples, "EPMC", start="free")
@@ -57,7 +57,7 @@ def unilateral(comm, highest, samples=1024):
 
 @pytest.mark.parametrize("amplitude", [1e-3, 1.0, 1e3])
 def test_unilateral_spring(comm, amplitude):
-    """REFERENCE: w = 2 w1 w2/(w1 + w2) = 4/3 at any amplitude, no damping."""
+    """w = 2 w1 w2/(w1 + w2) = 4/3 at any amplitude, no damping."""
     problem = unilateral(comm, 15)
     state = problem.state(solve_at(problem, amplitude))
     assert state["omega0"] == pytest.approx(4 / 3, abs=1e-7)
@@ -103,7 +103,7 @@ EXTREMES = {
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("which", list(EXTREMES))
 def test_extremes_of_the_parameters(comm, law, which):
-    """Issue 3. Each keeps one state of contact, so the mode is that linear structure's, undamped."""
+    """Each keeps one state of contact, so the mode is that linear structure's, undamped."""
     changes, (normal, tangential) = EXTREMES[which]
     contact = pair(law, random_map(1, 4), **changes)
     kn, kt = (normal * contact.parameters["normal_stiffness"], tangential * contact.parameters["tangential_stiffness"])

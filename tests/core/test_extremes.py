@@ -1,4 +1,4 @@
-"""Contact at its extremes: a correct answer, or exit 3 with the reason; closed forms and limits of REFERENCE."""
+"""Contact at its extremes: a correct answer, or exit 3 with the reason; closed forms and limits."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ from tolerances import LAST_BIT, LAST_DIGITS
 
 import fretwave as fw
 
-REFERENCE = 1.3  #: angular frequency of the starting mode
-BETA, OMEGA, AMPLITUDE = 0.05, 1.1, 0.7  #: scalars of the problems, the first two in units of REFERENCE
+W_REF = 1.3  #: angular frequency of the starting mode
+BETA, OMEGA, AMPLITUDE = 0.05, 1.1, 0.7  #: scalars of the problems, the first two in units
 
 
 class LinearCoupledLaw(CoupledLaw):
@@ -32,7 +32,7 @@ class LinearCoupledLaw(CoupledLaw):
 
 def mode(model, harmonics, method="CNM"):
     """A mode whose motion is 1 on every dof at first."""
-    linear = fw.LinearMode(REFERENCE, 0.0, np.ones(model.n_dof), np.zeros(model.n_dof))
+    linear = fw.LinearMode(W_REF, 0.0, np.ones(model.n_dof), np.zeros(model.n_dof))
     return fw.NonlinearMode(model, harmonics, method, 0, linear)
 
 
@@ -43,7 +43,7 @@ def random_motion(problem, seed=0):
 
 
 def test_labels_and_block_follow_the_retained_orders():
-    """DESIGN section 3: [Q0, Qc1, Qs1, ...] restricted to the retained set."""
+    """[Q0, Qc1, Qs1, ...] restricted to the retained set."""
     h = fw.Harmonics([0, 1, 3], 16)
     assert (h.orders, h.samples, h.block_size) == ((0, 1, 3), 16, 5)
     assert h.labels == ["0", "1c", "1s", "3c", "3s"]
@@ -59,7 +59,7 @@ def test_unusable_harmonics_are_refused(orders, samples):
 
 
 def test_choice_of_harmonics_leaves_out_what_an_odd_law_does_not_need(two_dof, comm):
-    """DESIGN section 5: odd harmonics only when the law is odd, said in words, and forced on by `all`."""
+    """Odd harmonics only when the law is odd, said in words, and forced on by `all`."""
     model = oscillator(two_dof, comm)
     auto, everything = fw.choose_harmonics(model, 5), fw.choose_harmonics(model, 5, retain="all")
     assert auto.orders == (1, 3, 5) and "even" in auto.left_out[0]
@@ -80,12 +80,12 @@ def test_unusable_choices_are_refused(two_dof, comm, arguments):
 
 
 def test_period_samples_are_the_fourier_series(comm):
-    """x = sum Re q_n e^{i n tau}, v = sum Re s_n q_n e^{i n tau}, q_n = Qc - i Qs (DESIGN section 1)."""
+    """x = sum Re q_n e^{i n tau}, v = sum Re s_n q_n e^{i n tau}, q_n = Qc - i Qs."""
     model = fw.Model(np.eye(2), chain(2), None, [fw.Contact(LinearLaw(1.0, 0.0), np.eye(2))], comm)
     problem = mode(model, fw.Harmonics([0, 1, 2], 8))
     y = random_motion(problem)
     Q, period = everywhere(problem, (problem.coefficients(y), problem.contact_period(y)))
-    tau, lambda_ = 2 * np.pi * np.arange(8) / 8, REFERENCE * (-BETA + 1j * OMEGA)
+    tau, lambda_ = 2 * np.pi * np.arange(8) / 8, W_REF * (-BETA + 1j * OMEGA)
     waves = [np.exp(1j * n * tau)[:, None] * (Q[:, 2 * n - 1] - 1j * Q[:, 2 * n]) for n in (1, 2)]
     x = Q[:, 0] + sum(wave.real for wave in waves)
     v = sum((n * lambda_ * wave).real for n, wave in zip((1, 2), waves))
@@ -165,7 +165,7 @@ def test_half_a_period_gives_the_residual_and_jacobian_of_the_whole(two_dof, com
 
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_everything_forced_on_changes_nothing(two_dof, comm, method):
-    """DESIGN section 5: even harmonics and the mean come out zero, all else the same to rounding."""
+    """Even harmonics and the mean come out zero, all else the same to rounding."""
     model = oscillator(two_dof, comm)
     linear = fw.linear_modes(model, 1)[0]
     found = []

@@ -54,7 +54,7 @@ def assert_same_iterations(found, expected):
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 @pytest.mark.parametrize("units", [pytest.param(u, marks=[] if u == "everything" else SERIAL) for u in UNITS])
 def test_same_branch_in_all_units(two_dof, comm, units, method):
-    """Issue 2 and DESIGN fact 4: dimensionless branch to 1e-9, in the same Newton iterations."""
+    """The branch without dimensions to 1e-9, in the same Newton iterations."""
     L, m, T = UNITS[units]
     expected, newton = dimensionless(scaled(two_dof, comm), method)
     found, newton_found = dimensionless(scaled(two_dof, comm, L, m, T), method, L, T)
@@ -138,7 +138,7 @@ def peak_zeta(model, highest, samples=4096):
 
 @SERIAL
 def test_peak_damping_converges_with_the_harmonics(two_dof, comm):
-    """DESIGN fact 2: one harmonic underestimates the peak by 40 %, H = 7 by 8 %."""
+    """One harmonic underestimates the peak by 40 %, H = 7 by 8 %."""
     model = oscillator(two_dof, comm)
     best = peak_zeta(model, 81)
     errors = [1 - peak_zeta(model, H) / best for H in (1, 7, 21, 61)]

@@ -13,7 +13,7 @@ import fretwave as fw
 pytestmark = pytest.mark.ranks(1, 2, 3)
 
 VARIANTS = ["CNM", "EPMC", "forced"]
-REFERENCE = 1.3  #: angular frequency of the starting mode
+W_REF = 1.3  #: angular frequency of the starting mode
 #: Scaled scalars (beta, omega, log amplitude), or (omega) for a forced response.
 SCALARS = {"CNM": [0.06, 1.1, -0.4], "EPMC": [0.06, 1.1, -0.4], "forced": [1.1]}
 #: Fourth-order differences with this step: truncation and rounding both stay below 1e-10 for these laws.
@@ -67,7 +67,7 @@ MODELS = {
 
 def problem_of(variant, model, orders):
     n = model.n_dof
-    linear = fw.LinearMode(REFERENCE, 0.0, np.ones(n), np.zeros(n))
+    linear = fw.LinearMode(W_REF, 0.0, np.ones(n), np.zeros(n))
     h = fw.Harmonics(orders, 32)
     if variant != "forced":
         return fw.NonlinearMode(model, h, variant, 1, linear)
@@ -120,7 +120,7 @@ def test_product_is_the_derivative_along_a_direction(problem, variant):
 
 
 def test_product_equals_the_assembled_jacobian_to_rounding(problem, variant):
-    """Issue 2: matrix-free Jacobian product exact to rounding."""
+    """Matrix-free Jacobian product exact to rounding."""
     y = random_point(problem, variant)
     J = dense(problem.jacobian(unknowns(problem, y)))
     for seed in range(3):

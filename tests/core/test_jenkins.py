@@ -26,7 +26,7 @@ def jenkins(B=((1.0,),), stiffness=1.0, limit=1.0):
 
 
 def complex_stiffness(a, stiffness=1.0, limit=1.0):
-    """REFERENCE: one harmonic, a > R/kt."""
+    """Complex stiffness of one harmonic in closed form, a > R/kt."""
     th = np.arccos(1 - 2 * limit / (stiffness * a))
     loss = 4 * limit / (np.pi * a) * (1 - limit / (stiffness * a))
     return stiffness / np.pi * (th - np.sin(2 * th) / 2) + 1j * loss
@@ -60,7 +60,7 @@ def measured_stiffness(a, samples=64):
 
 
 def test_closed_form_gives_the_reference_value():
-    """REFERENCE: kt = R = 1, a = 2."""
+    """kt = R = 1, a = 2: 0.5 + i / pi."""
     assert complex_stiffness(2.0) == pytest.approx(0.5 + 0.318310j, abs=5e-7)
 
 
@@ -74,7 +74,7 @@ def test_complex_stiffness_of_one_harmonic(a, samples):
 @given(st.floats(1.0, 50.0), positive, positive)
 @DRAWN
 def test_dissipated_work_is_the_closed_form(ratio, stiffness, limit):
-    """REFERENCE: 4 R (a - R/kt)."""
+    """Work of a period, 4 R (a - R/kt)."""
     a = ratio * limit / stiffness
     problem, y = imposed(jenkins(stiffness=stiffness, limit=limit), (0, a, 0, 0, 0, 0, 0))
     expected = 4 * limit * (a - limit / stiffness)
@@ -82,7 +82,7 @@ def test_dissipated_work_is_the_closed_form(ratio, stiffness, limit):
 
 
 def test_loss_is_largest_at_twice_the_slip_amplitude():
-    """REFERENCE: kt/pi at a = 2 R/kt; flat there, smaller on both sides."""
+    """kt/pi at a = 2 R/kt; flat there, smaller on both sides."""
     loss = {a: measured_stiffness(a).imag for a in (1.999, 2.0, 2.001)}
     assert loss[2.0] == pytest.approx(1 / np.pi, abs=ROUNDING)
     assert loss[1.999] < loss[2.0] > loss[2.001]
@@ -95,7 +95,7 @@ def initial_loading(x, stiffness, limit):
 
 @pytest.mark.parametrize("q", [(0, 2.5, 0, 0, 0, 0.2, 0), (0.7, 0, 1.8, 0, 0, 0, -0.1)])
 def test_parallel_elements_obey_masing(q):
-    """REFERENCE: branches from the extremes are the initial loading curve doubled, about a mean or not."""
+    """Masing: branches from the extremes are the initial loading curve doubled, about a mean or not."""
     stiffness, limit = np.array([1.0, 0.5, 2.0]), np.array([0.3, 0.8, 1.0])
     u, f = period(jenkins(np.ones((3, 1)), stiffness, limit), q, 256)
     x, f = u[:, 0], f.sum(axis=1)
@@ -139,7 +139,7 @@ def test_work_is_the_area_of_the_loop(q, stiffness, limit):
 @given(coefficients, st.integers(1, 63))
 @DRAWN
 def test_loop_does_not_depend_on_the_first_sample(q, shift):
-    """Started from rest and read on the second period (DESIGN fact 3): the same loop from any phase of the motion."""
+    """Started from rest and read on the second period: the same loop from any phase of the motion."""
     turned = np.array(q)
     for n in (1, 2, 3):
         c = (q[2 * n - 1] - 1j * q[2 * n]) * np.exp(2j * np.pi * n * shift / 64)
@@ -193,7 +193,7 @@ def test_stuck_element_is_a_spring(comm, method):
     assert abs(state["zeta"]) < ROUNDING and contact["work"] == 0 and contact["stick"] == 1
 
 
-#: REFERENCE: m = k = kt = R = 1, a = 2: (w0, zeta).
+#: m = k = kt = R = 1, a = 2: (w0, zeta).
 SINGLE_DOF = {"EPMC": (1.224745, 0.106103), "CNM": (1.238306, 0.104362)}
 
 
@@ -262,6 +262,6 @@ def wheel_mode(comm, n, diameters, samples):
 
 @pytest.mark.parametrize("n, diameters", [(5, 1), (5, 2), (24, 1), (24, 5), (24, 11)])
 def test_travelling_wave_on_a_full_wheel(comm, n, diameters):
-    """REFERENCE: k_eff = k + 4 sin^2(pi ND/N) kappa(2 a sin(pi ND/N)), any N, whatever samples a pair meets."""
+    """k_eff = k + 4 sin^2(pi ND/N) kappa(2 a sin(pi ND/N)), any N, whatever samples a pair meets."""
     found, exact = wheel_mode(comm, n, diameters, 16)
     assert found == pytest.approx(exact, rel=SOLVED)

@@ -144,7 +144,7 @@ def test_an_unknown_route_is_refused(case):
 
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_both_routes_find_the_same_branch(case, method):
-    """Issue 3: to 1e-9 in omega and beta, from stick to slip and lift-off."""
+    """To 1e-9 in omega and beta, from stick to slip and lift-off."""
     found = {
         route: [p for p in branch(mode(*case, route, method)) if p["event"] == "report"]
         for route in ("direct", *KRYLOV)
@@ -158,7 +158,7 @@ def test_both_routes_find_the_same_branch(case, method):
 
 @pytest.mark.parametrize("route", KRYLOV)
 def test_stuck_regime_needs_at_most_three_iterations(case, route):
-    """DESIGN fact 5: 2 iterations when stuck. From a perturbed point, as the linear mode itself needs none."""
+    """2 iterations when stuck. From a perturbed point, as the linear mode itself needs none."""
     problem = mode(*case, route)
     y = problem.initial(1e-3)
     begin, end = y.getOwnershipRange()
@@ -233,14 +233,14 @@ def test_a_contact_far_stiffer_than_the_structure(comm, route):
 
 
 def test_stuck_asymptote_is_the_linear_mode(krylov, case):
-    """Issue 3: to 1e-8."""
+    """To 1e-8."""
     assert krylov[0]["stick"] == 1
     assert krylov[0]["omega"] == pytest.approx(case[1].omega, rel=REPEATED)
     assert krylov[0]["zeta"] == pytest.approx(0, abs=ROUNDING)
 
 
 def test_branch_has_the_shape_of_a_blade_root(krylov):
-    """REFERENCE: constant frequency, threshold, drop with a rise of damping, maximum, then less damping."""
+    """Constant frequency, threshold, drop with a rise of damping, maximum, then less damping."""
     zeta, omega = (np.array([p[k] for p in krylov]) for k in ("zeta", "omega"))
     peak = int(np.argmax(zeta))
     assert 0 < peak < len(zeta) - 1 and zeta[peak] > 0.01

@@ -45,7 +45,7 @@ def test_force_is_regularised_coulomb(q, limit, velocity):
 
 
 def test_force_tends_to_coulomb_friction():
-    """REFERENCE: as eps -> 0 the force is mu N sign(v)."""
+    """As eps -> 0 the force is mu N sign(v)."""
     found = period(friction([[1.0]], 5.0, 1e-6), [0, 1.0, 0.5, 0, 0, 0, 0])
     assert np.allclose(found["f"], 5.0 * np.sign(found["v"]), rtol=0, atol=LAST_BIT)
 

@@ -13,7 +13,7 @@ from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
-#: Frequencies [Hz] of REFERENCE.
+#: Frequencies [Hz] of the lumped blisk (Laxalde et al. 2007), by its 3 x 3 problems.
 REFERENCE_HZ = {0: [88.26374399, 249.31165161, 619.34330474], 12: [195.67605066, 617.32579659, 2062.97568]}
 #: The slider's two kinks fall between samples: relative error of kappa about 1 / samples^2.
 SAMPLES, SAMPLED = 4096, 1e-6
@@ -71,7 +71,7 @@ def test_waves_of_the_sector_satisfy_the_wheel(comm):
 
 @pytest.mark.parametrize("nodal_diameter", range(SECTORS))
 def test_lumped_blisk_has_its_closed_form_frequencies(comm, nodal_diameter):
-    """REFERENCE, Laxalde et al. 2007: every nodal diameter from its 3 x 3 problem; no mode twice, none missing."""
+    """Every nodal diameter from its 3 x 3 problem (Laxalde et al. 2007); no mode twice, none missing."""
     with lumped_blisk().model(nodal_diameter, comm) as model:
         modes = fw.linear_modes(model, 5)
     expected = np.sqrt(scipy.linalg.eigvalsh(blisk_stiffness(nodal_diameter), np.diag(MASSES)))
@@ -136,7 +136,7 @@ def test_damped_waves_with_contact_tangents(comm, nodal_diameter):
 
 
 def kappa(a: float) -> complex:
-    """REFERENCE: complex stiffness of a Jenkins element (kt = R = 1) at relative amplitude a > 1."""
+    """Complex stiffness of a Jenkins element (kt = R = 1) at relative amplitude a > 1."""
     th = np.arccos(1 - 2 / a)
     return complex((th - np.sin(2 * th) / 2) / np.pi, 4 / (np.pi * a) * (1 - 1 / a))
 
@@ -144,7 +144,7 @@ def kappa(a: float) -> complex:
 @pytest.mark.parametrize(("sectors", "nodal_diameter"), [(5, 1), (5, 2), (5, 4), (24, 4), (24, 12), (24, 20)])
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_travelling_wave_on_a_chain_has_its_closed_form(comm, sectors, nodal_diameter, method):
-    """REFERENCE: k_eff = k + 4 sin^2(pi ND / N) kappa(2 a sin(pi ND / N)), then its single-dof formulas."""
+    """k_eff = k + 4 sin^2(pi ND / N) kappa(2 a sin(pi ND / N)), then its single-dof formulas."""
     sine = np.sin(np.pi * nodal_diameter / sectors)
     amplitude = 1.2 / sine
     stiffness = 1 + 4 * sine**2 * kappa(2 * amplitude * sine)

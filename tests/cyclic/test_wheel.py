@@ -42,7 +42,7 @@ def reported(problem):
 @pytest.mark.ranks(1, 2, 3)
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_the_wheel_follows_the_branch_of_its_sector(comm, method):
-    """Issue 4: omega and beta to 1e-8 along the branch (1e-12 here); DESIGN fact 6: tau at rounding."""
+    """omega and beta to 1e-8 along the branch (1e-12 here); tau at rounding."""
     sector = rubbing_blisk()
     with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
         stuck = fw.linear_modes(model, 1)[0]
@@ -71,7 +71,7 @@ def test_a_wave_of_the_sector_starts_the_wheel(comm):
 
 @pytest.mark.ranks(1)
 def test_unfolding_keeps_the_equations_of_a_double_mode_regular(comm):
-    """DESIGN fact 6: rank 2 is lost at small amplitude without it; with it the conditioning does not depend on it."""
+    """Rank 2 is lost at small amplitude without it; with it the conditioning does not depend on it."""
     sector = rubbing_blisk()
     with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
         start = sector.around(fw.linear_modes(model, 1)[0], DIAMETERS)
@@ -156,7 +156,7 @@ def test_modes_of_a_mistuned_wheel_are_those_of_its_matrices(comm):
 
 
 def test_mistuned_modes_tend_to_the_tuned_ones(comm):
-    """Issue 4: linearly in the deviation (first-order perturbation of the frequencies)."""
+    """Linearly in the deviation (first-order perturbation of the frequencies)."""
     with rubbing_blisk().wheel(comm) as wheel:
         tuned = np.array([mode.omega for mode in fw.linear_modes(wheel, 12)])
     distance = []

@@ -117,7 +117,7 @@ def test_work_is_shared_by_friction_and_viscous_damping(two_dof, comm):
 
 @pytest.mark.ranks(1)
 def test_resonance_moves_from_stuck_to_free_with_the_level(two_dof, comm):
-    """Asymptotes of REFERENCE: small forces resonate at the stuck frequency, large ones near the free one."""
+    """Asymptotes: small forces resonate at the stuck frequency, large ones near the free one."""
     peaks = []
     for level in (0.5, 30.0):
         # friction alone bounds the resonance up to about 9 N only (Den Hartog 1931), hence the viscous damper

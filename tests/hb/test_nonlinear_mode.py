@@ -42,14 +42,14 @@ def at_event(points, event):
 
 
 def test_paper_s_branch_folds_twice_at_stick_slip_onset(two_dof, comm):
-    """REFERENCE: folds in amplitude near 0.1347 and 0.1339, CNM, H = 21, N_t = 1024."""
+    """Folds in amplitude near 0.1347 and 0.1339, CNM, H = 21, N_t = 1024."""
     folds = at_event(paper_branch(two_dof, comm, "CNM"), "fold")
     assert [state["amplitude"] for state in folds] == pytest.approx([0.1347, 0.1339], abs=5e-5)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_paper_s_branch_is_most_damped_between_0_15_and_0_2(two_dof, comm, method):
-    """REFERENCE: one peak of zeta for an amplitude of m1 between 0.15 and 0.2, above every other point."""
+    """One peak of zeta for an amplitude of m1 between 0.15 and 0.2, above every other point."""
     points = paper_branch(two_dof, comm, method)
     peaks = at_event(points, "peak_damping")
     assert len(peaks) == 1 and 0.15 < peaks[0]["amplitude"] < 0.2
@@ -73,7 +73,7 @@ def test_damping_that_is_rounding_has_no_peak(comm):
 
 @pytest.mark.ranks(1)
 def test_paper_s_branch_goes_from_stuck_to_free(two_dof, comm):
-    """REFERENCE: both asymptotes; zeta tends to zero as friction becomes small beside the motion."""
+    """Both asymptotes; zeta tends to zero as friction becomes small beside the motion."""
     points = paper_branch(two_dof, comm, "CNM")
     assert points[0][0]["omega"] == pytest.approx(two_dof.omega_stuck, rel=1e-5)
     assert points[-1][0]["omega"] == pytest.approx(two_dof.omega_free, rel=5e-5)
@@ -82,7 +82,7 @@ def test_paper_s_branch_goes_from_stuck_to_free(two_dof, comm):
 
 @pytest.mark.ranks(1)
 def test_columns_of_a_state_belong_together(two_dof, comm):
-    """lambda = -beta + i w, w0 = |lambda|, zeta = beta / w0 (DESIGN section 1), in both methods."""
+    """lambda = -beta + i w, w0 = |lambda|, zeta = beta / w0, in both methods."""
     for method in METHODS:
         for s, _ in paper_branch(two_dof, comm, method):
             assert s["omega0"] == pytest.approx(np.hypot(s["beta"], s["omega"]), rel=LAST_DIGITS)
@@ -101,7 +101,7 @@ def viscous_singularity(two_dof, method, state):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_small_amplitudes_tend_to_a_viscous_damper(two_dof, comm, method):
-    """REFERENCE: mu N / eps as a -> 0; tanh(x) = x - x^3/3 makes the distance fall as a^2."""
+    """mu N / eps as a -> 0; tanh(x) = x - x^3/3 makes the distance fall as a^2."""
     problem = mode_problem(oscillator(two_dof, comm), [1, 3], 64, method, start="stuck")
     distances = [viscous_singularity(two_dof, method, problem.state(solve_at(problem, a))) for a in (4e-3, 2e-3)]
     assert distances[0] / distances[1] == pytest.approx(4, rel=0.01)
@@ -120,7 +120,7 @@ def test_small_amplitudes_of_cnm_tend_to_the_linearised_mode(two_dof, comm):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_coulomb_slider_on_a_single_dof(comm, method):
-    """REFERENCE: w0 = sqrt(k/m), zeta = 2 R / (pi k a) for one harmonic as eps -> 0; the error falls as eps^2."""
+    """w0 = sqrt(k/m), zeta = 2 R / (pi k a) for one harmonic as eps -> 0; the error falls as eps^2."""
     m, k, limit, a = 2.0, 3.0, 0.3, 2.0
     errors = []
     for eps in (0.1, 0.05, 0.025):
@@ -148,14 +148,14 @@ def test_one_harmonic_of_a_velocity_law_makes_cnm_and_epmc_equal(comm):
 
 
 def duffing_frequency(a, g=1.0):
-    """x'' + x + g x^3 = 0 with peak a: exact, all harmonics (REFERENCE)."""
+    """x'' + x + g x^3 = 0 with peak a: exact, all harmonics."""
     s = g * a**2
     return np.pi * np.sqrt(1 + s) / (2 * ellipk(s / (2 * (1 + s))))
 
 
 @pytest.mark.ranks(1)
 def test_closed_form_of_duffing_gives_the_reference_values():
-    """REFERENCE, to the digits printed there."""
+    """pi sqrt(1 + g a^2) / (2 K(m)), m = g a^2 / (2 (1 + g a^2)), to the digits given."""
     assert [duffing_frequency(a) for a in (0.5, 1, 2)] == pytest.approx([1.08915818, 1.31777606, 1.97601636], abs=5e-9)
 
 
@@ -189,7 +189,7 @@ def unilateral(comm, highest, amplitude=1.0):
 
 @pytest.mark.ranks(1)
 def test_unilateral_spring_converges_to_its_closed_form(comm):
-    """REFERENCE: w = 2 w1 w2 / (w1 + w2) = 4/3. The force has a kink: x_n ~ n^-4, and the frequency's error ~ H^-5."""
+    """w = 2 w1 w2 / (w1 + w2) = 4/3. The force has a kink: x_n ~ n^-4, and the frequency's error ~ H^-5."""
     errors = [abs(unilateral(comm, H) / (4 / 3) - 1) for H in (8, 16, 32)]
     assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(5, abs=0.2)
     assert errors[2] < 2e-9
@@ -215,7 +215,7 @@ def test_mass_proportional_damping_added_afterwards_is_exact_in_epmc(two_dof, co
 @pytest.mark.ranks(1)
 @pytest.mark.parametrize("method", METHODS)
 def test_negative_damping_added_afterwards_shifts_the_curve(two_dof, comm, method):
-    """Issue 2: c1 = -2 * 0.02 * sqrt(640) on m1 lowers zeta by 0.02; to 2e-4 away from slip onset, 1e-3 at 0.2."""
+    """c1 = -2 * 0.02 * sqrt(640) on m1 lowers zeta by 0.02; to 2e-4 away from slip onset, 1e-3 at 0.2."""
     without = at_event(paper_branch(two_dof, comm, method), "report")
     with_c1 = at_event(paper_branch(two_dof, comm, method, two_dof.negative_damping()), "report")
     shifts = np.array([b["zeta"] - a["zeta"] for a, b in zip(without, with_c1)])

@@ -34,7 +34,7 @@ def state_eigenvalues(M, C, K):
 
 
 def test_stuck_and_free_asymptotes_of_the_paper_s_oscillator(two_dof, comm):
-    """REFERENCE: sqrt(640) stuck; 24.1562 and 45.3484 rad/s free."""
+    """sqrt(640) stuck; 24.1562 and 45.3484 rad/s free."""
     model = oscillator(two_dof, comm)
     stuck, free = fw.linear_modes(model, 2, "stuck"), fw.linear_modes(model, 2, "free")
     high = np.sqrt(1320.0 + np.sqrt(1320.0**2 - 1.2e6))
@@ -223,7 +223,7 @@ def test_damped_modes_beside_a_free_motion(comm, damping, count):
 
 
 def test_friction_at_rest_is_a_viscous_damper(comm):
-    """REFERENCE: as a -> 0 the tanh law is a damper mu N / eps."""
+    """As a -> 0 the tanh law is a damper mu N / eps."""
     B = np.array([[0.0, 1.0, -1.0]])
     model = fw.Model(M3, K3, C3, [friction(B, 0.3, 2.0)], comm)
     check_quadratic_modes(fw.linear_modes(model, 3, "linearised"), M3, C3 + 0.15 * B.T @ B, K3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -95,12 +96,14 @@ def test_what_has_one_home_is_called_there_alone(call: str, home: str) -> None:
 
 
 def test_no_comment_leans_on_a_document_that_is_not_here() -> None:
-    """They cited facts and sections of a plan that is no part of the repository."""
+    """They cited facts, sections and issues of a plan that is no part of the repository."""
     root = PACKAGE.parents[1]
+    cited = re.compile(r"\b(DESIGN|REFERENCE|Issue \d)\b")
     files = [
         path
-        for part in ("src", "cases", "python")
+        for part in ("src", "cases", "python", "tests")
         for end in ("h", "cpp", "py")
         for path in (root / part).rglob(f"*.{end}")
     ]
-    assert [str(path) for path in files if "DESIGN" in path.read_text()] == []
+    files.remove(Path(__file__))
+    assert [str(path) for path in files if cited.search(path.read_text())] == []

@@ -27,7 +27,7 @@ class MixedLaw(LinearLaw):
 
 
 def blisk_stiffness(nodal_diameter: int, sectors: int = SECTORS) -> np.ndarray:
-    """Closed form of REFERENCE: the stiffness that a wave of this many nodal diameters sees."""
+    """Closed form: the stiffness that a wave of this many nodal diameters sees."""
     disk = GROUND + BLADE_1 + 4 * NEIGHBOUR * np.sin(np.pi * nodal_diameter / sectors) ** 2
     return np.array([[disk, -BLADE_1, 0], [-BLADE_1, BLADE_1 + BLADE_2, -BLADE_2], [0, -BLADE_2, BLADE_2]])
 
@@ -47,7 +47,7 @@ def jenkins_chain(sectors: int, k=1.0, kt=1.0, limit=1.0) -> fw.Sector:
 
 
 def kappa(a: float) -> complex:
-    """REFERENCE: complex stiffness of a Jenkins element (kt = R = 1) at relative amplitude a."""
+    """Complex stiffness of a Jenkins element (kt = R = 1) at relative amplitude a."""
     if a <= 1:
         return 1.0 + 0j
     th = np.arccos(1 - 2 / a)

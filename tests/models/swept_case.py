@@ -6,7 +6,7 @@ import sys
 
 from fretwave.commands.main import main
 
-#: A mass on a spring and a Jenkins element, m = k = kt = 1 (REFERENCE: single dof, one harmonic).
+#: A mass on a spring and a Jenkins element, m = k = kt = 1 (one harmonic: in closed form).
 CASE = """
 [model]
 dofs = ["x"]

@@ -36,7 +36,7 @@ class ModeOrbit(Orbit):
 
     @property
     def lambda_(self) -> complex:
-        """- zeta w0 + i w0 sqrt(1 - zeta^2), as DESIGN reports it."""
+        """- zeta w0 + i w0 sqrt(1 - zeta^2), as a mode table reports it."""
         return self.omega0 * complex(-self.zeta, np.sqrt(1 - self.zeta**2))
 
 

@@ -1,4 +1,4 @@
-"""The oracle against closed forms (REFERENCE)."""
+"""The oracle against closed forms."""
 
 from __future__ import annotations
 

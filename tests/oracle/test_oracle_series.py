@@ -56,7 +56,7 @@ def test_forces_have_their_derivative():
 
 
 def test_one_harmonic_has_its_closed_form():
-    """REFERENCE: m = k = kt = R = 1, a = 2, both methods; complex stiffness of a Jenkins element."""
+    """m = k = kt = R = 1, a = 2, both methods; complex stiffness of a Jenkins element."""
     system = System(ONE, 0 * ONE, ONE, [Jenkins(np.array([1.0]), 1.0, 1.0)])
     th = np.arccos(1 - 2 * 0.5)
     kappa = (th - np.sin(2 * th) / 2) / np.pi + 2j / np.pi * 0.5

@@ -112,7 +112,7 @@ def test_table_is_written_as_csv_and_as_markdown(tmp_path):
 
 @pytest.mark.ranks(1, 2)
 def test_study_of_the_two_dof_case_shows_that_harmonics_pay(tmp_path):
-    """One harmonic misses 40 % of the peak damping, seven about 8 % (REFERENCE; measured with other programs)."""
+    """One harmonic misses 40 % of the peak damping, seven about 8 % (measured with other programs)."""
     from pathlib import Path
 
     from mpi4py import MPI

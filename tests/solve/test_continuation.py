@@ -29,7 +29,7 @@ def named(points, event):
 
 
 def test_branch_goes_through_both_folds_without_a_gap(two_dof, comm):
-    """DESIGN fact 1: the amplitude goes back between the folds; no step is longer than allowed."""
+    """The amplitude goes back between the folds; no step is longer than allowed."""
     branch, points = follow(problem_of(two_dof, comm), maximum=0.2)
     assert branch.converged and branch.reason == "stop value reached"
     first, second = (p.index for p in named(points, "fold"))

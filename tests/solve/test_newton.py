@@ -17,7 +17,7 @@ M, K, LIMIT = 1.0, 1e6, 10.0  #: of the single mass [kg, N/m, N]
 
 
 def jenkins(kt, amplitude):
-    """Complex stiffness of a Jenkins element under one harmonic: its force over its motion (REFERENCE)."""
+    """Complex stiffness of a Jenkins element under one harmonic: its force over its motion."""
     if kt * amplitude <= LIMIT:
         return complex(kt, 0)
     y = LIMIT / (kt * amplitude)
@@ -27,7 +27,7 @@ def jenkins(kt, amplitude):
 
 
 def closed_form(method, friction):
-    """(omega0, zeta) of the single mass with one harmonic (REFERENCE) and the complex stiffness of its friction."""
+    """(omega0, zeta) of the single mass with one harmonic and the complex stiffness of its friction."""
     k = K + friction
     if method == "EPMC":
         return np.sqrt(k.real / M), k.imag / (2 * k.real)

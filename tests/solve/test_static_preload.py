@@ -188,7 +188,7 @@ def mode_about(model, rest, orders=(0, 1), samples=64, method="EPMC", dof=0):
 
 @pytest.mark.parametrize("law", ["coulomb_3d", "coulomb_3d_uncoupled", "jenkins"])
 def test_stuck_motion_keeps_the_mean_tangential_force(comm, law):
-    """DESIGN fact 3: the slider starts from the static state, so the mean force is static, 0.6 of mu N0."""
+    """The slider starts from the static state, so the mean force is static, 0.6 of mu N0."""
     model = tangential_support(comm, law)
     static = 0.6 * MU * N0
     rest = at_rest(model, static * (K + KT) / KT)

@@ -107,7 +107,7 @@ def amplitude_losses(comm, eps, limit=0.05, periods=3):
 
 @SERIAL
 def test_coulomb_slider_loses_4_r_over_k_per_period(comm):
-    """REFERENCE: 4 R / k exactly, for any amplitude, as eps -> 0; the difference falls as eps^2."""
+    """4 R / k exactly, for any amplitude, as eps -> 0; the difference falls as eps^2."""
     coarse, fine = (amplitude_losses(comm, eps) - 0.2 for eps in (1e-2, 1e-3))
     assert np.abs(fine).max() < 1e-6
     assert coarse / fine == pytest.approx([100] * 3, rel=0.02)

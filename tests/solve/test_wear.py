@@ -12,7 +12,7 @@ from fretwave.solve.steppers import STEPPERS
 
 pytestmark = pytest.mark.ranks(1)
 
-#: REFERENCE: one Jenkins node at imposed amplitude, the normal load constant over a period.
+#: One Jenkins node at imposed amplitude, the normal load constant over a period.
 A, B, C, P0 = 1.0, 0.5, 4e-3, 1.5
 
 
@@ -46,7 +46,7 @@ def marched(mode, y, cycles, control, **options):
 
 @pytest.mark.parametrize("stepper, tolerance", [("bogacki_shampine", 1e-8), ("tr_bdf2", 3e-9)])
 def test_closed_form_of_one_node(comm, stepper, tolerance):
-    """REFERENCE: P(100) = 1.33576005, P(1000) = 0.10417001; the work 4 mu P (a - bP) has its peak kt a^2 at 274.653."""
+    """P(100) = 1.33576005, P(1000) = 0.10417001; the work 4 mu P (a - bP) has its peak kt a^2 at 274.653."""
     mode, y = node(comm)
     control = fw.WearControl(stepper, tolerance)
     found = {p[0]: p for p in marched(mode, y, 1000.0, control, report_at=[100.0, 274.653])}
