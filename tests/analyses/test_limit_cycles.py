@@ -11,7 +11,7 @@ from models.jenkins_motion import JenkinsMotion
 from tolerances import REPEATED, SOLVED
 
 from fretwave.analyses.parts import fed_modes
-from fretwave.results.overview import overviews
+from fretwave.results.overview import Overview, overviews
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import run_case
 
@@ -151,3 +151,13 @@ def test_what_grows_in_the_opposite_wave_is_not_of_this_one(monkeypatch, g, fed)
     monkeypatch.setattr(fed_modes, "_companion", lambda context, modes: np.array([[0.0, 1.0], [-(1 + 1j * g), 0.0]]))
     found = fed_modes._growing(None, [None])
     assert list(found) == fed and all(value.imag > 0 for value in found.values())
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("zeta, told", [(-3e-17, "zeta 0 %"), (1.2e-16, "zeta 0 %"), (2e-6, "zeta 0.0002 %")])
+@pytest.mark.parametrize("more", [{}, {"cycles": 10.0, "worn": 0.5, "worn_unit": "mm^3"}], ids=["mode", "wear"])
+def test_damping_that_rounding_leaves_is_none(zeta, told, more):
+    """A peak of an undamped branch was shown as 1.2e-14 %."""
+    peak = {"point": 0, "zeta": zeta, "amplitude": 1.0, **more}
+    row = Overview("m", "mode", "CNM", "done", "", 2, "m", {}, peak, None, {}, None).cells()
+    assert f"{told}," in row[5]

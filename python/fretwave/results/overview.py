@@ -14,7 +14,7 @@ from ..arrays import Indices
 from ..files.lock import is_taken
 from ..post.largest import largest
 from ..post.limit_cycles import stability
-from ..post.mode_curve import most_damped
+from ..post.mode_curve import most_damped, without_rounding
 from ..texts import counted
 from ..units import units_of
 from .file import OVERRIDES, open_results, unit_of_amplitudes
@@ -99,10 +99,10 @@ class Overview:
     def _peak(self) -> str:
         top = self.peak
         if "worn" in top:
-            damping = f"zeta {100 * top['zeta']:.3g} %, {top['cycles']:.3g} cycles"
+            damping = f"zeta {100 * without_rounding(top['zeta']):.3g} %, {top['cycles']:.3g} cycles"
             return f"{damping}; worn {top['worn']:.3g} {top['worn_unit']}"
         if "zeta" in top:
-            return f"zeta {100 * top['zeta']:.3g} %, {top['amplitude']:.4g} {self.unit}"
+            return f"zeta {100 * without_rounding(top['zeta']):.3g} %, {top['amplitude']:.4g} {self.unit}"
         if not top:
             return ""
         sector = f" of sector {top['largest_sector']:.0f}" if "largest_sector" in top else ""
