@@ -306,3 +306,18 @@ def test_a_report_names_every_stuck_mode(solve):
         assert f'data-from="linear/frequency_hz/{row}"' in text and f'data-from="linear/other_hz/{row}"' in text
     assert ">free, mode" not in text
     assert "other hz" not in text and ">frequency of the mode most like it, sliding or free [Hz]<" in text
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 1.2])
+def test_damping_of_a_double_mode_does_not_depend_on_the_axes(solve, angle):
+    """A mass on equal springs, a damper along a line at an angle: 0 and c / (2 m w). At 45 degrees it was half each.
+
+    A third mass beside it, damped by itself.
+    """
+    c, along = 0.08, np.array([np.cos(angle), np.sin(angle), 0.0])
+    C = c * np.outer(along, along) + np.diag([0.0, 0.0, 0.02])
+    matrices = f"M = {np.diag([2.0, 2.0, 1.0]).tolist()}\nK = {np.diag([18.0, 18.0, 25.0]).tolist()}\n"
+    model = f'[model]\ndofs = ["x", "y", "z"]\n{matrices}C = {C.tolist()}\n'
+    rows = table(solve(model + '[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = 3\n'))
+    assert column(rows, "omega") == pytest.approx([3.0, 3.0, 5.0], rel=TIGHT)
+    assert column(rows, "zeta") == pytest.approx([0.0, c / (2 * 2.0 * 3.0), 0.02 / (2 * 5.0)], abs=ROUNDING)

@@ -14,6 +14,7 @@ from ...model.sectors import Term, in_wave
 from ...post.engine_orders import exciting, margins
 from .asymptotes import MORE_MODES, limit_model, most_like, planes_of, sector_phase
 from .context import AnalysisContext
+from .damped_basis import in_damped_basis
 
 if TYPE_CHECKING:
     from ...case.load import Case
@@ -55,7 +56,7 @@ def modes_of_wave(
     """Rows of a wave at a speed and their modes, limit by limit. Collective."""
     case, theta = _spinning(context, speed_rpm), sector_phase(context.case, diameters)
     C = case.damped(context.analysis.dampers).C
-    found = {limit: _modes(context, case, limit, diameters) for limit in _limits(context)}
+    found = {limit: in_damped_basis(_modes(context, case, limit, diameters), C, theta) for limit in _limits(context)}
     loose = next((found[limit] for limit in ("sliding", "free") if limit in found), [])
     for limit, modes in found.items():
         sought = limit == "stuck" and bool(loose)
