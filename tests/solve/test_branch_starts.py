@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from models.core_models import friction, mode_problem, single_dof, whole
 from models.followed import follow, response, stop
+from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave import _core
-from fretwave.solve.starting import Way, mode_start, starts
+from fretwave.solve import starting
+from fretwave.solve.starting import STALLED, Way, mode_start, starts
 
 # Den Hartog's oscillator with a limit of 0.3: most frequencies start in a motion that Newton does not find from zero.
 SLIDERS = [("jenkins", 1e2), ("jenkins", 1e3), ("jenkins", 1e4), ("regularised_coulomb", 1e-3)]
@@ -92,3 +97,23 @@ def test_ways_to_a_start_have_exact_derivatives(comm):
         assert np.allclose(exact, assembled, rtol=0, atol=ROUNDING * abs(exact).max())
         # the law they share stands where it stood once the problem itself is evaluated
         problem.residual(y)
+
+
+class Tangle:
+    """A branch that goes up to 0.2 and runs about there for ever."""
+
+    converged, reason = False, "under way"
+
+    def __iter__(self):
+        for k in itertools.count():
+            unknowns = PETSc.Vec().createSeq(1, comm=PETSc.COMM_SELF)
+            parameter = min(0.001 * k, 0.15 + 0.05 * np.sin(k))
+            yield SimpleNamespace(y=unknowns, tangent=unknowns.duplicate(), parameter=parameter)
+
+
+@pytest.mark.ranks(1)
+def test_a_way_that_comes_no_nearer_to_its_end_is_given_up():
+    """Regularised friction of many samples: a way ran about at 5 % of its range for its 20,000 points."""
+    last, count, reason = starting._last(Tangle(), goal=1.0)
+    assert last is not None and STALLED < count < 1000
+    assert reason == f"it comes no nearer in {STALLED} points"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Union
 
+import numpy as np
 from petsc4py import PETSc
 
 from .. import _core
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 AFAR = 5
 #: Points of a way at the most: it turns a corner wherever a pair opens or closes.
 WAY_POINTS = 20000
+#: Points of a way that come no nearer to its end, after which it is given up: a tangle where samples change states.
+STALLED = 300
 #: Steps of a mode that grows, at first in proportion: where such long ones lose their way, those of any branch.
 GROWTH = (
     StepControl(initial=1.5, maximum=3.0, max_error=1e-2, max_points=WAY_POINTS),
@@ -121,13 +124,13 @@ def _led(
     closing = how == CLOSING
     stop = (0.0, 2 * way.last_entry(core.initial())) if closing else (-1.0, 1.0)
     branch = follow(way, core.initial(), stop, control, upwards=not closing, way=True)
-    last, count = _last(branch)
+    last, count, reason = _last(branch, stop[0 if closing else 1])
     if branch.converged and last is not None:
         y = core.response(last) if isinstance(core, _core.ForcedStart) else core.mode(last)
         branch.destroy()
         yield f"by {how} in {count} steps", y
         return
-    reasons.append(f"{how}: {branch.reason}")
+    reasons.append(f"{how}: {reason}")
     branch.destroy()
 
 
@@ -158,8 +161,8 @@ def _from_afar(
         span = (0.5 * begin, amplitude) if upwards else (amplitude, 2 * begin)
         for control in GROWTH:
             branch = follow(problem, problem.initial(begin), span, control, upwards=upwards, way=True)
-            last, count = _last(branch, nearby=True)
-            converged, reason = branch.converged, branch.reason
+            last, count, reason = _last(branch, amplitude, nearby=True)
+            converged = branch.converged
             branch.destroy()
             if converged and last is not None:
                 yield f"the mode was followed from amplitude {begin:.3g} in {count} steps", last
@@ -175,19 +178,24 @@ def _from_afar(
         reasons.append(f"no mode was found at {AFAR} {which} amplitudes, to {begin:.3g}")
 
 
-def _last(branch: Continuation, nearby: bool = False) -> tuple[PETSc.Vec | None, int]:
-    """Unknowns of the last point of a branch, and the number of its points. Collective.
+def _last(branch: Continuation, goal: float, nearby: bool = False) -> tuple[PETSc.Vec | None, int, str]:
+    """Unknowns of the last point of a branch, the number of its points, and why it ended. Collective.
 
     Parameters
     ----------
+    goal : parameter that it is to reach
     nearby : nothing is followed from a first point far from the linear mode
     """
-    last, count = None, 0
+    last, count, nearest, since = None, 0, np.inf, 0
     for point in branch:
         if last is not None:
             last.destroy()
         point.tangent.destroy()
         last, count = point.y, count + 1
         if nearby and count == 1 and far_from_start(branch.problem, last):
-            return None, 0
-    return last, count
+            return None, 0, branch.reason
+        if (left := abs(point.parameter - goal)) < nearest:
+            nearest, since = left, count
+        if count - since >= STALLED:
+            return last, count, f"it comes no nearer in {STALLED} points"
+    return last, count, branch.reason
