@@ -4,8 +4,11 @@
 
 #include "hb/harmonic_problem.h"
 #include "model/mode_orientation.h"
+#include "solve/vectors.h"
 
 namespace fretwave::hb {
+
+using solve::dot, solve::zero_like;
 
 namespace {
 
@@ -13,7 +16,25 @@ constexpr char const* free_mean =
     "the mean position is free: every pair that held it slips or opens within a period";
 constexpr double mostly = 0.9;  // of a step's square: it is one in the mean
 constexpr double far = 1e4;     // motions: nothing that moves so little shifts its mean there
+constexpr double clearly = 1e6;  // times that, dof by dof: no motion that K leaves free
 constexpr double unsure = 10;  // times the least that K does not know: 3 are seen (a printed matrix, reduced)
+
+/// The mean of the motion of all dofs, each in the first of the entries of its block.
+VecHandle mean_of(model::Model const& model, int block, Vec blocks) {
+  VecHandle out = make_vector(model.comm(), model.local_dofs());
+  const ReadArray in(blocks);
+  const WriteArray mean(out);
+  for (PetscInt i = 0; i < model.local_dofs(); ++i) mean[i] = in[i * block];
+  return out;
+}
+
+/// A motion that is its mean alone.
+void put_mean(Vec mean, int block, Vec blocks) {
+  check(VecSet(blocks, 0));
+  const ReadArray in(mean);
+  const WriteArray out(blocks);
+  for (PetscInt i = 0; i < local_size(mean); ++i) out[i * block] = in[i];
+}
 
 }  // namespace
 
@@ -34,31 +55,37 @@ std::string HarmonicProblem::explain(Vec, Vec dy) {
 
 /// A mean that is far from rest beside the motion, or moves so along the branch (dy), though neither K,
 /// beyond its rounding, nor contact bears it: the net force of the friction is not balanced, and there is no
-/// periodic motion.
+/// periodic motion. The two are asked one by one: what friction pushes by and a spring holds cancels.
 std::string HarmonicProblem::adrift(Vec y, Vec dy) {
   const PetscInt m = harmonics().block_size();
   if (harmonics().orders()[0] != 0 || m == 1) return {};
-  VecHandle shift = make_vector(comm(), model().local_dofs()), force = like(q_);
-  linearise(y);
   double largest[2] = {};  // of the mean, of the motion
   {
     const ReadArray all(y), in(dy);
-    const WriteArray mean(shift), block(dQ_);
     for (PetscInt i = 0; i < local_block_; ++i) {
       const bool moves = i % m != 0;
       largest[moves] = std::max(largest[moves], std::abs(moves ? all[i] : in[i]));
-      block[i] = moves ? 0 : in[i];
-      if (!moves) mean[i / m] = in[i];
     }
   }
   MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, comm());
   if (!(largest[0] > far * largest[1])) return {};
-  double energy, uncertain = 0;
-  residual_.product(dQ_, nullptr, force);
-  check(VecDot(dQ_, force, &energy));
-  for (auto const& term : model().terms())
-    if (term.order == 0) uncertain += model::uncertainty(term.A, shift);
-  return std::abs(energy) <= unsure * uncertain ? free_mean : "";
+  const VecHandle shift = mean_of(model(), m, dy), by_K = zero_like(shift), force = like(shift);
+  double uncertain = 0;
+  for (auto const& term : model().terms()) {
+    if (term.order != 0) continue;
+    check(MatMult(term.A, shift, force));
+    check(VecAXPY(by_K, 1, force));
+    uncertain += model::uncertainty(term.A, shift);
+  }
+  linearise(y);
+  put_mean(shift, m, dQ_);
+  residual_.product(dQ_, nullptr, dR_);
+  const double of_K = dot(shift, by_K), of_contact = dot(shift, mean_of(model(), m, dR_)) - of_K;
+  double each;
+  check(VecPointwiseMult(force, shift, by_K));
+  check(VecNorm(force, NORM_1, &each));
+  const bool held = std::max(std::abs(of_K), std::abs(of_contact)) >= unsure * uncertain;
+  return held || each >= clearly * uncertain ? "" : free_mean;
 }
 
 }  // namespace fretwave::hb

@@ -208,6 +208,7 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
   Failure failure;
   double soft = INFINITY;  // an end of the present piece that is no corner
   wary_ = anchor_.wary;
+  adrift_.clear();
   for (const bool beyond : {false, true}) {
     if (beyond && (!wary_ || !adrift_.empty())) break;
     double intended = anchor_.step;  // but for the ends of pieces
@@ -220,7 +221,6 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
         return trial;
       }
       intended = length / 2;
-      if (!adrift_.empty()) failure.explained = adrift_;
       if (!adrift_.empty() && length < end_known) break;
       if (!wary_ && length < soft) wary_ = corner_within(length, soft);
     }

@@ -8,9 +8,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from models.linear_cases import CONTACT, GROUND, KN, KT, MASS, MASS_SHARE, NEXT, POINT, STIFFNESS_SHARE, K, M, ring
 from tolerances import ROUNDING, TIGHT
 
+from fretwave import LinearMode
+from fretwave.analyses.parts.damped_basis import in_damped_basis
 from fretwave.plots import campbell, safe
 from fretwave.plots.linear_bands import bands, peaks
 from fretwave.post.engine_orders import crossing_speeds, excited_by, frequency_at, usual_orders
@@ -308,16 +311,35 @@ def test_a_report_names_every_stuck_mode(solve):
     assert "other hz" not in text and ">frequency of the mode most like it, sliding or free [Hz]<" in text
 
 
+@pytest.mark.parametrize("modes", [1, 2, 3])
 @pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 1.2])
-def test_damping_of_a_double_mode_does_not_depend_on_the_axes(solve, angle):
+def test_damping_of_a_double_mode_does_not_depend_on_the_axes(solve, angle, modes):
     """A mass on equal springs, a damper along a line at an angle: 0 and c / (2 m w). At 45 degrees it was half each.
 
+    A gyroscopic part of C, which linear modes leave out, takes nothing from that, nor do modes that are not asked for.
     A third mass beside it, damped by itself.
     """
     c, along = 0.08, np.array([np.cos(angle), np.sin(angle), 0.0])
     C = c * np.outer(along, along) + np.diag([0.0, 0.0, 0.02])
+    C += 0.02 * np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     matrices = f"M = {np.diag([2.0, 2.0, 1.0]).tolist()}\nK = {np.diag([18.0, 18.0, 25.0]).tolist()}\n"
     model = f'[model]\ndofs = ["x", "y", "z"]\n{matrices}C = {C.tolist()}\n'
-    rows = table(solve(model + '[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = 3\n'))
-    assert column(rows, "omega") == pytest.approx([3.0, 3.0, 5.0], rel=TIGHT)
-    assert column(rows, "zeta") == pytest.approx([0.0, c / (2 * 2.0 * 3.0), 0.02 / (2 * 5.0)], abs=ROUNDING)
+    rows = table(solve(model + f'[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = {modes}\n'))
+    assert column(rows, "omega") == pytest.approx([3.0, 3.0, 5.0][:modes], rel=TIGHT)
+    zeta = [0.0, c / (2 * 2.0 * 3.0), 0.02 / (2 * 5.0)]
+    assert column(rows, "zeta") == pytest.approx(zeta[:modes], abs=ROUNDING)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_modes_that_are_damped_alike_stay_next_to_their_axes(seed):
+    """Of a triple one is damped: it is turned to, and the others are the same from any basis that `eigh` may give."""
+    turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+    found = []
+    for signs in ([1.0, 1.0, 1.0], [1.0, -1.0, 1.0]):
+        modes = [LinearMode(2.0, 0.0, shape, np.zeros(3)) for shape in (turn * signs).T]
+        found.append(in_damped_basis(modes, sp.csr_array(np.diag([0.0, 0.0, 0.1]))))
+    for mode, other in zip(*found):
+        assert abs(mode.shape @ other.shape) == pytest.approx(1.0, abs=ROUNDING)
+    shapes = np.array([mode.shape for mode in found[0]])
+    assert shapes @ shapes.T == pytest.approx(np.eye(3), abs=ROUNDING)
+    assert np.abs(shapes[:, 2]) == pytest.approx([0.0, 0.0, 1.0], abs=ROUNDING)

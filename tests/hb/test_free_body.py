@@ -131,3 +131,31 @@ def test_closed_contact_holds_a_body_far_from_rest() -> None:
         expected = np.linalg.solve(K + stop - omega**2 * M + 1j * omega * C, push)
         assert q[0, 0] == pytest.approx(2.0)
         assert np.hypot(q[1, 1], q[1, 2]) == pytest.approx(abs(expected[1]), rel=1e-8)
+
+
+@pytest.mark.parametrize("link, share", [(3e3, 1e-9), (30.0, 1e-7), (3e4, 1e-10), (1e5, 3e-11)])
+def test_a_spring_bears_what_friction_pushes_by_however_stiff_the_plate(link: float, share: float) -> None:
+    """The same spring to the ground, 3e-6: friction's part of the tangent, which is not symmetric, hides none of it."""
+    M, C, K = plate(0.0)
+    K[1, 1], K[2, 2], K[1, 2], K[2, 1] = link, link * (1 + share), -link, -link
+    given = {"friction_coefficient": MU, "normal_stiffness": KN, "tangential_stiffness": KT, "normal_load": N0}
+    model = fw.Model(M, K, C, [fw.Contact("coulomb_2d", PLATE[::-1], given)])
+    branch = fw.follow(fw.NonlinearMode(model, fw.Harmonics(range(6), 256), "CNM", 0), 1e-3, 1.0)
+    assert branch.converged and branch["amplitude"][-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("K", [[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [-1.0, 0.0]]])
+def test_a_static_shift_without_strain_energy_is_borne(K: list[list[float]]) -> None:
+    """x . K x is zero of what a saddle or circulatory forces hold: a linear response beside a shift 1e5 times it."""
+    contact = fw.Contact("unilateral_spring", np.array([[1.0, 0.0]]), {"normal_stiffness": [50.0], "gap": [1e3]})
+    model = fw.Model(np.eye(2), np.array(K), 0.5 * np.eye(2), [contact])
+    reference = fw.linear_modes(fw.Model(np.eye(2), np.eye(2)), 1)[0]
+    static, push = np.array([1.0, 1.0]), np.array([1e-5, 0.0])
+    problem = fw.ForcedResponse(model, fw.Harmonics(range(4), 64), {0: static, 1: push}, 1.0, 0, reference)
+    branch = fw.follow(problem, 0.5, 2.0)
+    assert branch.converged
+    for k, omega in enumerate(branch["omega"]):
+        q = branch.coefficients(k)
+        expected = np.linalg.solve(K - omega**2 * np.eye(2) + 0.5j * omega * np.eye(2), push)
+        assert q[:, 0] == pytest.approx(np.linalg.solve(K, static))
+        assert np.hypot(q[0, 1], q[0, 2]) == pytest.approx(abs(expected[0]), rel=1e-8)

@@ -81,6 +81,12 @@ with GridFile(Path(sys.argv[1]), [0.0]) as grid:
 """
 
 
+def test_an_error_of_another_file_is_told_as_that(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"results\.h5"), GridFile(tmp_path / "view.vtkhdf", [0.0]):
+        open(tmp_path / "results.h5").close()
+    assert not list(tmp_path.iterdir())
+
+
 def test_two_processes_may_write_one_file(tmp_path: Path) -> None:
     """Both wrote to one name beside it: the other was refused, or its file was taken. The last to end is there."""
     path = tmp_path / "grid.vtkhdf"

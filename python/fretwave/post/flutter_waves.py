@@ -75,7 +75,7 @@ def verdict(zeta: npt.ArrayLike, top: int = -1) -> str:
         ``stable below``: damped at first. ``neutral``: neither.
     """
     signs = np.sign(np.where(np.abs(zeta) > NO_DAMPING, zeta, 0.0))
-    before_top = signs[: top % len(signs) + 1]
+    before_top = signs if top == -1 else signs[: top + 1]
     at_top, signs = before_top[before_top != 0][-1:], signs[signs != 0]
     if not len(signs):
         return "neutral"

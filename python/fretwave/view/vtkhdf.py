@@ -9,7 +9,7 @@ Plain serial h5py. ParaView reads such files from version 5.12 on (VTK 9.3).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -180,12 +180,15 @@ class GridFile:
     def __enter__(self) -> GridFile:
         return self
 
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
+        if error is not None:  # which may be of another file
+            self._file.close()
+            with suppress(BaseException):
+                self._place.__exit__(kind, error, trace)
+            return
         with ExitStack() as ending:
             ending.push(self._place)
             ending.callback(self._file.close)
-            if error is not None:
-                raise error
             self._complete()
 
     def _complete(self) -> None:

@@ -18,6 +18,7 @@ from .damped_basis import in_damped_basis
 
 if TYPE_CHECKING:
     from ...case.load import Case
+    from ...model.model import Model
     from ...model.modes import LinearMode
     from ..linear import LinearAnalysis
 
@@ -56,7 +57,7 @@ def modes_of_wave(
     """Rows of a wave at a speed and their modes, limit by limit. Collective."""
     case, theta = _spinning(context, speed_rpm), sector_phase(context.case, diameters)
     C = case.damped(context.analysis.dampers).C
-    found = {limit: in_damped_basis(_modes(context, case, limit, diameters), C, theta) for limit in _limits(context)}
+    found = {limit: _modes(context, case, limit, diameters, C) for limit in _limits(context)}
     loose = next((found[limit] for limit in ("sliding", "free") if limit in found), [])
     for limit, modes in found.items():
         sought = limit == "stuck" and bool(loose)
@@ -94,24 +95,36 @@ def _limits(context: AnalysisContext[LinearAnalysis]) -> list[str]:
     return context.analysis.limits(any(contact.sliding() is not None for contact in contacts), bool(contacts))
 
 
-def _modes(context: AnalysisContext[LinearAnalysis], case: Case, limit: str, diameters: int) -> list[LinearMode]:
+def _modes(
+    context: AnalysisContext[LinearAnalysis], case: Case, limit: str, diameters: int, C: Optional[Term]
+) -> list[LinearMode]:
     """Modes of a wave; where another's likeness is sought among them, more than are told. Maybe none. Collective."""
-    from ...model.modes import linear_modes
-
     with limit_model(case, context.comm, limit, diameters) as model:
         limits = _limits(context)
         sought = "stuck" in limits and limit == next((one for one in ("sliding", "free") if one in limits), "")
         count = _count(context, MORE_MODES if sought else 0)
         try:
-            modes = linear_modes(model, min(model.n_dof, count + sought))
+            modes = _with_their_planes(model, count)
         except NothingMoves:
             if limit != "stuck" or context.analysis.contact == ["stuck"]:
                 raise
             context.console.line(f"{context.name}: contact that sticks leaves nothing to move")
             return []
-    if len(modes) > count:  # of the last, a double one, the other may be left out
-        return modes[: max(_count(context), int(planes_of(modes)[-1][0]))]
-    return modes[:count]
+    told = _count(context) if sought else count
+    last = int(planes_of(modes)[-1][0]) if len(modes) > count else count  # of which others may be left out
+    return in_damped_basis(modes, C, sector_phase(context.case, diameters))[: max(told, last)]
+
+
+def _with_their_planes(model: Model, count: int) -> list[LinearMode]:
+    """So many modes, and the others of the last one's frequency: which of them are damped, all tell. Collective."""
+    from ...model.modes import linear_modes
+
+    asked = count
+    while True:
+        asked = min(model.n_dof, asked + 1)
+        modes = linear_modes(model, asked)
+        if len(modes) < asked or asked == model.n_dof or planes_of(modes)[-1][0] >= count:
+            return modes
 
 
 def damping_ratio(mode: LinearMode, C: Optional[Term], theta: float = 0.0) -> float:
