@@ -71,6 +71,20 @@ def test_spring_held_by_friction(comm, law, load):
     assert (rest.stick, rest.slip, rest.open) == ((1, 0, 0) if sticks else (0, 1, 0))
 
 
+@pytest.mark.parametrize("load", [1e-3, 1.0, 50.0])
+@pytest.mark.parametrize("gap", [None, 0.4])
+def test_the_lowest_mode_may_be_one_that_the_load_does_not_move(comm, load, gap):
+    """A component mode in sqrt(mass) length beside a dof in lengths, 1e5 times softer: no measure of its motion."""
+    row = [[0.0, 1.0]] if gap is None else [[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]]
+    met = contact(row, "jenkins") if gap is None else contact(row, gap=gap)
+    model = fw.Model(np.diag([1.0, 1e-6]), np.diag([1e5, K]), None, [met], comm)
+    rest = at_rest(model, [0.0, load])
+    friction = min(KT * load / (K + KT), MU * N0)
+    by_stop = max(0.0, KN * (load / K - (gap or 0.0)) / (1 + KN / K))
+    expected = (load - (friction if gap is None else by_stop)) / K
+    assert rest.displacement == pytest.approx([0.0, expected], rel=ROUNDING, abs=ROUNDING * expected)
+
+
 def test_slip_under_two_tangential_loads_is_along_their_resultant(comm):
     """Coupled limit: T opposes the slip, |T| = mu N, k x + T = P with x along P."""
     model = fw.Model(np.eye(2), K * np.eye(2), None, [contact([[0, 0], [1, 0], [0, 1]], normal_load=N0)], comm)

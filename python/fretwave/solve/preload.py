@@ -18,7 +18,7 @@ from ..model.model import Model
 from ..model.modes import LinearMode, linear_modes
 from ..model.rest import Rest
 from ..mpi.gather import on_all_ranks
-from .continuation import Continuation
+from .continuation import Continuation, Point
 from .steps import StepControl
 
 #: What is kept of each contact.
@@ -33,6 +33,9 @@ UNHELD = 1e-10
 RIGID = 1e-6
 #: Of the reference mode's stiffness: what is softer than that is rounding of the stiff contact beside it.
 SOFTEST = 1e-8
+#: Times the reference mode's displacement under the load: one that is larger at first is measured by itself, for a step
+#: is at most half of what displacements are measured by.
+FAR = 100.0
 
 
 class StaticPreload(HarmonicProblem):
@@ -43,12 +46,20 @@ class StaticPreload(HarmonicProblem):
     load : (n_dof,) P
     reference : LinearMode
         Scales the unknowns.
+    times : float
+        What displacements are measured by, over the load's by the reference mode's stiffness.
     """
 
     core: _core.StaticPreload
 
     def __init__(
-        self, model: Model, load: Array, reference: LinearMode, constant: Array | None = None, prefix: str = "static_"
+        self,
+        model: Model,
+        load: Array,
+        reference: LinearMode,
+        constant: Array | None = None,
+        prefix: str = "static_",
+        times: float = 1.0,
     ) -> None:
         if not reference.omega > 0:
             load_name = own_load(model.contacts)
@@ -60,7 +71,7 @@ class StaticPreload(HarmonicProblem):
                 "an elastic mode",
                 f"load the contact{by}, hold the structure, or take a mode with closed contact",
             )
-        self.stiffness = stiffness = reference.omega**2 / float(np.sum(reference.shape**2))
+        self.stiffness = stiffness = reference.omega**2 / float(np.sum(reference.shape**2)) / times
         size = (float(np.linalg.norm(load)) or stiffness) / stiffness
         self.force_scale, self.size = stiffness * size, size
         core = _core.StaticPreload(model.core, model.vector(load), size, stiffness)
@@ -133,14 +144,20 @@ def static_preload(
     reference = reference or linear_modes(model, 1)[0]
     rest = balanced(model, reference)
     load = load if balance else load - rest.load
-    problem = StaticPreload(model, load, reference, rest.load)
     history = None if sliders is None else model.local_sliders(sliders)
-    if history is not None:
-        problem.core.stand(history)
     control = steps or StepControl(initial=0.1, maximum=0.5)
-    start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
-    y, reached, branch = None, 0.0, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
-    reason = ""
+
+    def begin(times: float) -> tuple[StaticPreload, Continuation]:
+        problem = StaticPreload(model, load, reference, rest.load, times=times)
+        if history is not None:
+            problem.core.stand(history)
+        start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
+        return problem, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
+
+    problem, branch = begin(1.0)
+    times = _times(next(branch, None), branch)
+    problem, branch = begin(times if times > FAR else 1.0)
+    y, reached, reason = None, 0.0, ""
     for point in branch:
         y, reached = point.y, point.parameter
         if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
@@ -166,6 +183,18 @@ def static_preload(
         "1",
         "hold the structure where contact alone cannot (an axial stop), or lower the load",
     )
+
+
+def _times(first: Point | None, branch: Continuation) -> float:
+    """Displacement under the full load as it begins, over what displacements are measured by; 1 where nothing holds it.
+
+    The reference mode may be one that the load does not move, and its length is none where a reduction's coordinates,
+    lengths and square roots of mass, stand in one vector. Collective.
+    """
+    if first is None:
+        return 1.0
+    by_load = abs(branch.last_entry(first.tangent))
+    return float(np.sqrt(max(1.0 - by_load**2, 0.0)) / by_load) if by_load >= UNHELD else 1.0
 
 
 def _led_by(motion: Array, names: Sequence[str] | None) -> str:
