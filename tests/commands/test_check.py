@@ -6,6 +6,7 @@ import csv
 import re
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from command_line import call
@@ -141,6 +142,50 @@ def test_normal_loads_are_balanced_unless_told_otherwise(tmp_path: Path, capfd) 
     assert f"normal forces sum to {N0 + KN * y:.5g} N" in said and "note" not in said
     assert KT * abs(x) < MU * (N0 + KN * y), "it sticks"
     assert "at rest: 1 stick" in said
+
+
+LOADED = """
+[model]
+dofs = ["x"]
+M = [[1.0]]
+K = [[3.0]]
+loads_at_speed = { pull = { 3000 = [0.2] } }
+speed_rpm = 3000.0
+[preload]
+loads = ["pull"]
+[[contact]]
+name = "slider"
+law = "jenkins"
+pairs = ["x"]
+tangential_stiffness = 2.0
+friction_limit = 1.0
+"""
+FORCED = """
+[[analysis]]
+name = "forced"
+type = "forced"
+harmonics = 5
+samples = 64
+force = { x = 0.1 }
+levels = [1.0]
+frequency = [0.2, 0.5]
+observe = "x"
+"""
+
+
+@pytest.mark.parametrize("analysis", [CASE[CASE.index("[[analysis]]") :], FORCED])
+@pytest.mark.parametrize("loads, kept", [(True, [0, 1, 2, 3, 4, 5]), (False, [1, 3, 5])])
+def test_harmonics_are_those_that_a_run_keeps(tmp_path: Path, capfd, analysis: str, loads, kept) -> None:
+    """Of a law that is odd without load, about the displacement of one: even harmonics and the mean are kept."""
+    path = put(tmp_path, (LOADED if loads else LOADED.replace('[preload]\nloads = ["pull"]\n', "")) + analysis)
+    name = "mode" if '"mode"' in analysis else "forced"
+    assert call("check", path) == 0
+    said = capfd.readouterr().out
+    assert call("run", path, "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    with h5py.File(tmp_path / "run" / "results.h5") as file:
+        numbers = sorted({int(label.decode().rstrip("cs")) for label in file[name]["harmonic"][:]})
+        assert numbers == kept and f"1 x {file[name]['coefficients'].shape[2]} = " in said
+    assert ("even harmonics and the mean" in said) == (0 not in kept)
 
 
 def test_amplitudes_that_never_slip(tmp_path: Path, capfd) -> None:

@@ -169,8 +169,8 @@ class AnalysisSection(Section):
         """What it would compute, in a line of `fretwave check`."""
         return self.type.replace("_", " ")
 
-    def details(self, model: Model) -> list[str]:
-        """Further lines of `fretwave check`. Collective."""
+    def details(self, model: Model, preloaded: bool = False) -> list[str]:
+        """Further lines of `fretwave check`, of an analysis with a [preload] or without. Collective."""
         if not self.dampers:
             return []
         unit = self.units("force s/length")

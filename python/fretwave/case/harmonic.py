@@ -115,12 +115,12 @@ class HarmonicSection(AnalysisSection):
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
         return harmonic_memory(self.harmonics, self.samples, (facts.sectors or 1) if self.wheel else 1, facts)
 
-    def details(self, model: Model) -> list[str]:
+    def details(self, model: Model, preloaded: bool = False) -> list[str]:
         from ..hb.harmonics import choose_harmonics
 
-        lines = super().details(model)
+        lines = super().details(model, preloaded)
         sizes = (self.harmonics, self.samples) if self.accuracy is None else (LEAST_HARMONICS, LEAST_SAMPLES)
-        harmonics = choose_harmonics(model, *sizes, self.retain)
+        harmonics = choose_harmonics(model, *sizes, retained_by(self, preloaded))
         n_dof = model.n_dof * (model.sectors if self.wheel else 1)
         if self.accuracy is not None:
             lines.append(f"accuracy {self.accuracy:g}: harmonics and samples follow from it, at the least")
@@ -145,6 +145,11 @@ class HarmonicSection(AnalysisSection):
         if self.nodal_diameter is None:
             return place
         return f"a {self.wave_word()} of {self.nodal_diameter} nodal diameters on {place}"
+
+
+def retained_by(analysis: HarmonicSection, preloaded: bool) -> str:
+    """Which harmonics are kept: about a state at rest the even ones too, unless told otherwise."""
+    return "all" if analysis.retain == "auto" and preloaded else analysis.retain
 
 
 def nodal_diameter(analysis: AnalysisSection) -> int:

@@ -24,6 +24,8 @@ from ..texts import counted, display
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from ..model.model import Model
+
 
 def check_case(
     path: Path, overrides: Sequence[str], only: Sequence[str], quick: bool, comm: MPI.Comm, solve: bool = True
@@ -44,7 +46,7 @@ def check_case(
     warnings = odd_ratios(case)
     case = reduce_case(case, comm, only=names)
     with build_model(case, (), comm) as model:
-        described = {name: [case.analyses[name].headline(), *case.analyses[name].details(model)] for name in names}
+        described = {name: _described(case, name, model) for name in names}
     found = at_rest(case, names if solve else [], comm)
     for name, lines in found.lines.items():
         described[name] += lines
@@ -57,6 +59,12 @@ def check_case(
     if found.failures:
         raise _one(found.failures, case)
     return EXIT_DONE
+
+
+def _described(case: Case, name: str, model: Model) -> list[str]:
+    """What an analysis would compute. Collective."""
+    analysis = case.analyses[name]
+    return [analysis.headline(), *analysis.details(model, case.preload_of(analysis) is not None)]
 
 
 def _one(failures: Sequence[FretwaveError], case: Case) -> FretwaveError:

@@ -11,7 +11,7 @@ import scipy.sparse.linalg
 
 from ...arrays import Array
 from ...case.analysis import AnalysisSection
-from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, nodal_diameter
+from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, nodal_diameter, retained_by
 from ...case.schema import PreloadSection
 from ...errors import InputError, NothingMoves
 from ...model.contact import Contact
@@ -211,9 +211,8 @@ def retained(
     """
     from ...hb.harmonics import choose_harmonics
 
-    analysis, retain = context.analysis, context.analysis.retain
-    if retain == "auto" and context.case.preload_of(analysis) is not None:
-        retain = "all"
+    analysis = context.analysis
+    retain = retained_by(analysis, context.case.preload_of(analysis) is not None)
     if analysis.accuracy is not None and highest is None:  # it begins with the least set
         highest, samples = LEAST_HARMONICS, LEAST_SAMPLES
     return choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
