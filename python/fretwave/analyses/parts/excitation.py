@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +20,7 @@ from ...post.motion import complex_amplitudes
 from .branch import continuation
 from .context import AnalysisContext
 from .observed import observed_by
-from .rest import rest_state, start_mode
+from .rest import modes_or_free, rest_state, start_mode
 from .tuned import tuned_sector
 
 if TYPE_CHECKING:
@@ -34,6 +34,13 @@ if TYPE_CHECKING:
     from ...model.rest import Rest
     from ...solve.continuation import Continuation
     from ..forced import ForcedAnalysis
+
+
+#: Lowest modes among which a force finds the one that it moves, of models of at most so many dofs: where coordinates of
+#: several units stand in one vector, as those of a reduction do.
+DRIVEN, SMALL = 10, 2000
+#: Times the static displacement that the reference mode's stiffness gives: a mode that is moved more scales instead.
+FAR = 100.0
 
 
 def forces(context: AnalysisContext[ForcedAnalysis]) -> dict[str, float]:
@@ -54,6 +61,20 @@ def wave_of_forces(context: AnalysisContext[ForcedAnalysis]) -> Complex:
     return force
 
 
+def most_driven(reference: LinearMode, modes: Sequence[LinearMode], force: Complex) -> LinearMode:
+    """The mode whose static displacement is largest, where it is far beyond what the reference's stiffness gives.
+
+    A mode of unit modal mass is displaced statically by phi (phi^H P) / omega^2 under P; |P| over the stiffness
+    omega^2 / |phi|^2 bounds that from above.
+    """
+    elastic = [mode for mode in modes if mode.omega > 0]
+    shapes = [mode.shape + 1j * mode.imaginary for mode in elastic]
+    sizes = [np.linalg.norm(x) * abs(np.vdot(x, force)) / mode.omega**2 for x, mode in zip(shapes, elastic)]
+    shape = np.hypot(reference.shape, reference.imaginary)
+    most = np.linalg.norm(force) * float(np.sum(shape**2)) / reference.omega**2
+    return elastic[int(np.argmax(sizes))] if sizes and max(sizes) > FAR * most else reference
+
+
 @dataclass
 class Excitation:
     """What the responses of all levels share.
@@ -61,7 +82,7 @@ class Excitation:
     Attributes
     ----------
     reference : LinearMode
-        Scales the unknowns.
+        By its number, with the contact as it is at rest.
     rest : Rest or None
     phase : float or None
         Of the last point of the response [rad]: the next one's is the nearest to it, no jump by 2 pi.
@@ -72,6 +93,14 @@ class Excitation:
     reference: LinearMode
     rest: Optional[Rest]
     phase: float | None = None
+
+    @cached_property
+    def scale(self) -> LinearMode:
+        """Scales the unknowns. Collective the first time."""
+        if self.context.case.wheel is not None or self.context.model.n_dof > SMALL:
+            return self.reference
+        count = min(DRIVEN, self.context.model.n_dof)
+        return most_driven(self.reference, modes_or_free(self.context, count), wave_of_forces(self.context))
 
     @property
     def analysis(self) -> ForcedAnalysis:
@@ -93,7 +122,7 @@ class Excitation:
             force={1: wave_of_forces(self.context)},
             level=level,
             dof=self.observed,
-            reference=self.reference,
+            reference=self.scale,
             prefix=self.context.prefix,
             rest=self.rest,
         )
