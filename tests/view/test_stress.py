@@ -109,6 +109,18 @@ def curvature(x: float) -> float:
     return float((beta / LENGTH) ** 2 * bent / tip)
 
 
+def test_a_level_below_the_lowest_is_said(tmp_path: Path, capfd) -> None:
+    """The lowest level breaks the beam: the force that it bears is below, and no level between two is."""
+    damped = CASE.replace('"cantilever.py"', '"cantilever.py"\nmass_damping = 6.0')
+    levels = FORCED.replace("[0.5, 1.0, 4.0]", "[40.0, 80.0]")
+    folder = solved(tmp_path, damped + MATERIAL + levels)
+    capfd.readouterr()
+    assert call("stress", folder) == 0
+    found = table(folder / "forced_goodman.csv")
+    assert (found["largest_goodman"] > 1).all() and np.isnan(found["limit_level"]).all()
+    assert "Goodman factor 1 below level 40 of the force, the lowest" in capfd.readouterr().out
+
+
 def test_a_gauge_reads_the_strain_of_a_beam(run: Path) -> None:
     found = table(run / "mode_gauges.csv")
     wanted = curvature(0.2) * HEIGHT / 2 * found["amplitude"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +57,7 @@ def lines(table: StressTable) -> Iterator[str]:
     columns, rows = endurance(table)
     units = {column.name: column.symbol for column in columns}
     yield from (_of_limit(row, units) for row in rows)
-    levels = {row["limit_level"] for row in rows if "limit_level" in row}
-    yield from (f"Goodman factor 1 at level {level:.5g} of the force" for level in levels if np.isfinite(level))
+    yield from _of_level(rows)
 
 
 def _at(table: StressTable, k: int, amplitude: Column) -> str:
@@ -84,6 +83,17 @@ def _of_stress(table: StressTable, known: Mapping[str, Column]) -> str:
     mean = _mean(row["mean_stress"], row["stress_amplitude"])
     values = f"amplitude {row['stress_amplitude']:.5g} {unit} about a mean of {mean} {unit}"
     return f"worst stress: {values}, node {row['worst_node']}{sector}, {_at(table, k, known['amplitude'])}"
+
+
+def _of_level(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """At which level of a force the largest factor is 1: between two of them, or below the lowest."""
+    if not rows or "limit_level" not in rows[0]:
+        return
+    level, lowest = rows[0]["limit_level"], min(rows, key=lambda row: float(row["level"]))
+    if np.isfinite(level):
+        yield f"Goodman factor 1 at level {level:.5g} of the force"
+    elif lowest["largest_goodman"] >= 1:
+        yield f"Goodman factor 1 below level {lowest['level']:g} of the force, the lowest"
 
 
 def _of_limit(row: Mapping[str, Any], units: Mapping[str, str]) -> str:
