@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 
 import numpy as np
 from petsc4py import PETSc
@@ -155,10 +156,13 @@ def static_preload(
         return problem, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
 
     problem, branch = begin(1.0)
-    times = _times(next(branch, None), branch)
-    problem, branch = begin(times if times > FAR else 1.0)
+    first = next(branch, None)
+    if (times := _times(first, branch)) > FAR:
+        branch.destroy()
+        problem, branch = begin(times)
+        first = next(branch, None)
     y, reached, reason = None, 0.0, ""
-    for point in branch:
+    for point in chain([] if first is None else [first], branch):
         y, reached = point.y, point.parameter
         if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
             led = _led_by(_of_dofs(model, point.tangent), names)
