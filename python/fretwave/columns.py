@@ -176,6 +176,8 @@ MODE = (
     *(f"lambda_error_{source}" for source in SOURCES),
     *_SHARED,
 )
+#: Of a mode and its error.
+MODAL = MODE[MODE.index("omega") : MODE.index("stick")]
 FLUTTER = ("point", "nodal_diameter", *MODE[1:])
 FORCED = (
     *("point", "level", "omega", "frequency_hz", "amplitude", "phase", "amplitude_error"),

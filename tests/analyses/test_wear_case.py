@@ -72,6 +72,48 @@ def test_table_has_a_line_for_each_amplitude(run: Path) -> None:
         assert max(abs(float(row["energy_error"])) for row in line) < REPEATED
 
 
+@pytest.fixture(scope="module")
+def unworn(folder: Path, tmp_path_factory) -> list[dict[str, str]]:
+    out = tmp_path_factory.mktemp("mode")
+    assert main(["run", str(folder / "case.toml"), "--only", "mode", "--no-plots", "--out", str(out)]) == 0
+    return rows(out, "mode")
+
+
+BY_SOURCE = [f"lambda_error_{name}" for name in ("harmonics", "samples", "reduction")]
+
+
+def test_new_surfaces_have_the_errors_of_the_mode(run: Path, unworn: list[dict[str, str]]) -> None:
+    """But for what their linear systems are solved to: 1 % at most."""
+    for new in (row for row in rows(run) if row["event"] == "start"):
+        own = next(row for row in unworn if float(row["amplitude"]) == pytest.approx(float(new["amplitude"]), rel=1e-9))
+        for name in ("omega_error", "zeta_error"):
+            assert float(new[name]) == pytest.approx(float(own[name]), rel=1e-2)
+        for name in BY_SOURCE:
+            assert float(new[name]) == pytest.approx(float(own[name]), rel=1e-2, abs=1e-3 * float(own["omega_error"]))
+
+
+@pytest.mark.parametrize(
+    ("sets", "known"),
+    [
+        ([], lambda row: row["event"] != ""),
+        (["wear.errors=true"], lambda row: True),
+        (["wear.errors=false"], lambda row: False),
+        (["mode.errors=false"], lambda row: False),
+        (["mode.errors=false", "wear.errors=true"], lambda row: True),
+    ],
+    ids=str,
+)
+def test_errors_are_where_they_are_asked_for(folder: Path, tmp_path: Path, capfd, sets: list[str], known) -> None:
+    given = [word for text in sets for word in ("--set", text)]
+    assert main(arguments(folder, tmp_path, "--set", "wear.amplitude=[2.1e-6]", *given)) == 0
+    table = rows(tmp_path)
+    assert len(table) > 4
+    assert [row["omega_error"] != "nan" for row in table] == [known(row) for row in table]
+    told = capfd.readouterr().out
+    assert ("error of zeta up to" in told) == any(map(known, table))
+    assert ("errors of the points between" in told) == (not sets)
+
+
 def test_arrays_belong_to_the_rows(run: Path) -> None:
     with h5py.File(run / "results.h5") as file:
         wear = file["wear"]

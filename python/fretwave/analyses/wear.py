@@ -85,11 +85,18 @@ class WearAnalysis(AnalysisSection):
     samples: Optional[Whole] = key(
         "time samples of a period, in place of the mode's", example="256", default=None, ge=4
     )
+    errors: Optional[bool] = key(
+        "estimate the errors of the mode at the depths of every point, or of none (by default, where the mode "
+        "estimates its own, at the first point, those of `report_at` and the last)",
+        example="true",
+        default=None,
+    )
 
     def settings(self, case: Case) -> ModeAnalysis:
         """Its mode, with what it gives in place of the mode's."""
         mode = case.analyses.of(ModeAnalysis)[self.mode]
-        own = {name: getattr(self, name) for name in ("harmonics", "samples") if getattr(self, name) is not None}
+        names = ("harmonics", "samples", "errors")
+        own = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         own |= {"name": self.name, "dampers": self.dampers or mode.dampers, "accuracy": None}
         return mode.model_copy(update=own)
 
@@ -158,6 +165,8 @@ class WearAnalysis(AnalysisSection):
             if f"y_{number}" in starts
         ]
         unit = float(starts["cycle_unit"])
+        if settings.errors and self.errors is None:
+            context.leave_out(["errors of the points between those of report_at (errors = true)"])
         context.console.line(f"{context.name}: a normalised cycle is {unit:.6g} vibration cycles")
         march = LineRunner(context, settings, unit)
         apart = None if groups.seen_by_all(context.comm, kept.file(0)) else 1  # their files are to meet in one folder

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..columns import Column, columns_named
+from ..columns import MODAL, Column, columns_named
 from ..errors import InputError
 from ..given import positive
-from ..hb.harmonic_problem import HarmonicProblem
 from .branch import Branch
 from .steps import WearControl
 from .table import Table
@@ -19,7 +18,7 @@ from .wear import Wear, WearPoint
 from .worn_mode import WornMode
 
 #: What the table of a march says beside its points' own numbers.
-STATE = ("omega", "omega0", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "work", "energy_error")
+STATE = (*MODAL, "stick", "slip", "open", "work", "energy_error")
 SOLVER = ("step_error", "force_outside", "residual", "newton", "linear", "event")
 COLUMNS = columns_named(["cycles", "vibrations", "step", "amplitude", *STATE, *SOLVER])
 
@@ -83,6 +82,7 @@ def wear(
     cycle_unit: float | None = None,
     control: WearControl | None = None,
     report_at: Sequence[float] = (),
+    errors: bool | None = None,
     tell: Callable[[dict[str, Any]], None] | None = None,
 ) -> WearMarch:
     """March a mode over wear cycles at an amplitude of its unworn branch. Collective.
@@ -105,6 +105,9 @@ def wear(
         Vibration cycles in a normalised one; by default those in which sliding four stick limits a cycle leaves 1/e of
         a normal load (`WornMode.normal_cycle`), with the loads of the branch's first point.
     control : WearControl, optional
+    errors : bool, optional
+        Estimate those of the mode (`HarmonicProblem.errors`) at every point, or at none; by default at the first, the
+        reported and the last. They are at its depths: what these are off by is not in them. Else they are nan.
     tell : callable, optional
         Given every row when it is found, on every rank.
 
@@ -135,7 +138,7 @@ def wear(
         march = Wear(mode, new.y, unit * cycles, control, [unit * value for value in report_at], outcome=outcome)
         new.y.destroy()
         for point in march:
-            rows.append(problem.model.comm.bcast(wear_row(problem, point, unit)))
+            rows.append(problem.model.comm.bcast(wear_row(mode, point, unit, errors)))
             states.append((point.state.depth, point.state.rate, point.state.load))
             if tell is not None:
                 tell(rows[-1])
@@ -157,11 +160,13 @@ def wear(
     )
 
 
-def wear_row(problem: HarmonicProblem, point: WearPoint, unit: float) -> dict[str, Any]:
-    """What the table of a march says of a point. Collective."""
-    y, energy = point.state.y, problem.energy(point.state.y)
+def wear_row(mode: WornMode, point: WearPoint, unit: float, errors: bool | None = None) -> dict[str, Any]:
+    """What the table of a march says of a point; `errors` as `wear` takes them. Collective."""
+    y, problem = point.state.y, mode.problem
+    energy = problem.energy(y)
     return {
         **problem.state(y),
+        **mode.errors(point.state, bool(point.event) if errors is None else errors),
         **problem.diagnostics(y),
         "cycles": point.cycles / unit,
         "vibrations": point.cycles,

@@ -87,6 +87,8 @@ class WornMode(Destroyable):
         self._newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)
         rtol, atol, stol, most = self._newton.snes.getTolerances()
         self._newton.snes.setTolerances(rtol, SHARPER * atol, stol, most)
+        #: Why `errors` estimates nothing, once asked.
+        self.errors_left_out = ""
         self._row = problem.core.unknowns()
         self._row.set(0.0)
         self._set_last(self._row, 1.0)
@@ -260,6 +262,37 @@ class WornMode(Destroyable):
             t.set(0.0)
         b.destroy()
         return t
+
+    def along(self, state: WornState) -> PETSc.Vec | None:
+        """Unit tangent of the branch over amplitude at the state's depths; None where it has none to be found."""
+        self.wear(state.depth)
+        beside = _core.Newton(self.problem.core, self.problem.prefix, past_kinks=False)
+        t, weighted = self.problem.core.unknowns(), self.problem.core.unknowns()
+        t.set(0.0)
+        beside.system.close(self._row, 0.0)
+        found = beside.linear(state.y, self._row, t)
+        self.problem.core.metric(state.y, weighted)
+        weighted.pointwiseMult(weighted, t)
+        length = float(np.sqrt(weighted.dot(t))) if found else np.nan
+        weighted.destroy()
+        if not 0 < length < np.inf:
+            t.destroy()
+            return None
+        t.scale(1 / length)
+        return t
+
+    def errors(self, state: WornState, estimated: bool = True) -> dict[str, float]:
+        """`HarmonicProblem.errors` of the mode at the state's depths, which count as exact; nan unless `estimated`.
+
+        All solvers for it are new: the march is the same with it and without, and it is the same when resumed.
+        """
+        t = self.along(state) if estimated else None
+        found = self.problem.errors(state.y, t)
+        if t is not None:
+            self.errors_left_out = self.problem.errors_left_out
+            self.problem.forget_errors()
+            t.destroy()
+        return found
 
     def destroy(self) -> None:
         """Free the solver; the contacts are as new again."""

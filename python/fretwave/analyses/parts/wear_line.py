@@ -12,13 +12,13 @@ import numpy as np
 
 from ...case import contacts
 from ...case.load import Case
-from ...columns import COLUMNS, Column, Value
+from ...columns import COLUMNS, MODAL, Column, Value
 from ...console import Console
 from ...mpi.spread import Spread, fill
 from ...results.results import AnalysisWriter, Field
 from ...texts import counted
 from ...units import ATTRIBUTE
-from .branch import finished_table, mode_problem, open_branch
+from .branch import error_text, finished_table, largest_error, mode_problem, open_branch
 from .context import AnalysisContext
 from .rest import retained, start_mode
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Name of a line's table in its own folder.
 LINE = "line"
-SHARED = ("omega", "omega0", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "work", "energy_error")
+SHARED = (*MODAL, "stick", "slip", "open", "work", "energy_error")
 SOLVER = ("step_error", "force_outside", "residual", "newton", "linear", "wall_s", "event")
 
 
@@ -176,7 +176,7 @@ class _Marcher:
         y, state = point.state.y, point.state
         per_contact = self._per_contact(state)
         row: dict[str, Value] = {
-            **wear_row(self.problem, point, self.unit),
+            **wear_row(self.mode, point, self.unit, self.analysis.errors if self.own.analysis.errors else False),
             "point": self.writer.rows,
             "line": self.line.number,
             "wall_s": wall,
@@ -210,6 +210,7 @@ class _Marcher:
         self.context.console.detail(
             f"{self.context.name} a {row['amplitude']:.4g} {units('length')}  {row['cycles']:8.4g} cycles"
             f"  f {row['frequency_hz']:9.6g} Hz  zeta {100 * row['zeta']:7.4f} %"
+            f"{error_text(100 * row['zeta_error'])}"
             f"  slip {100 * row['slip']:3.0f} %  open {100 * row['open']:3.0f} %"
             f"  worn {worn} {units('length^3')}  newton {row['newton']:2d}  {row['wall_s']:.2f} s"
         )
@@ -217,6 +218,8 @@ class _Marcher:
     def _close(self, march: Wear) -> dict[str, Any]:
         status = "done" if march.converged else "stopped"
         told = _told(finished_table(self.writer))
+        if self.mode.errors_left_out:
+            told += f"; errors are not estimated: {self.mode.errors_left_out}"
         self.writer.abandon()  # its journal stays until the common table is done: a resumed run finds the line there
         end, length = march.eta / self.unit, self.context.units("length")
         return {
@@ -235,8 +238,10 @@ def _told(table: dict[str, Any]) -> str:
     if not table:
         return ""
     zeta, top = np.round(100 * table["zeta"], 4) + 0.0, int(np.argmax(table["zeta"]))
+    error = largest_error("zeta", 100 * table["zeta_error"], "%").rstrip(",")
     jumps = sum("jump" in event.split() for event in table["event"])
     return (
         f"; zeta {zeta[0]:.4f} % when new, largest {zeta[top]:.4f} % at {table['cycles'][top]:.3g}, {zeta[-1]:.4f} %"
-        f" at the end" + (f"; {counted(jumps, 'jump')} to another sheet of the mode" if jumps else "")
+        f" at the end{',' * bool(error)}{error}"
+        + (f"; {counted(jumps, 'jump')} to another sheet of the mode" if jumps else "")
     )
