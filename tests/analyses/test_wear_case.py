@@ -252,6 +252,25 @@ def test_far_coefficients_and_units_that_are_numbers_are_marched(
     assert main(arguments(folder, tmp_path, *words, "--set", "wear.report_at=[]")) == 0
 
 
+def test_steps_have_an_end(folder: Path, run: Path, tmp_path: Path, capsys) -> None:
+    """Steps of a millionth of the pressure went on for days; what was found is kept, and gone on with counts on."""
+    words = [f"--set=wear.{text}" for text in ("max_points=6", "amplitude=[2.1e-6]", "report_at=[1e-9, 3.0]")]
+    assert main(arguments(folder, tmp_path, *words, "--set", "wear.pressure_change=1e-7")) == 3
+    told = capsys.readouterr()
+    assert "largest number of points" in told.err and "6 points are kept" in told.err
+    assert "--set wear.max_points=" in told.err and "report at 3 cycles: the march ended at" in told.out
+    table = rows(tmp_path)
+    assert len(table) == 6 and float(table[-1]["cycles"]) > 0
+    assert [row["event"] for row in table if row["event"]] == ["start", "report"]
+
+
+def test_a_resumed_march_counts_the_points_before(folder: Path, tmp_path: Path) -> None:
+    words = ("--set", "wear.max_points=9", "--set", "wear.amplitude=[2.1e-6]", "--set", "wear.pressure_change=1e-4")
+    kill_at(command(*arguments(folder, tmp_path, *words)), tmp_path / ".wear_lines" / "line_000" / "line.csv", 4)
+    assert subprocess.run(command("resume", str(tmp_path)), capture_output=True).returncode == 3
+    assert len(rows(tmp_path)) == 9
+
+
 def test_pairs_without_area_cannot_wear(tmp_path: Path) -> None:
     code, areas = BUILDER.read_text(), "areas=np.full(2, AREA),"
     text = TEXT.replace("tangential_stiffness_per_area = 2e10", "tangential_stiffness = 4e6")
@@ -274,7 +293,9 @@ def test_pairs_whose_area_is_none_cannot_wear(tmp_path: Path, area: str) -> None
         load_case(tmp_path / "case.toml")
 
 
-@pytest.mark.parametrize("reason", ["step too small: the contact changes too fast", "the mode ends here"])
+@pytest.mark.parametrize(
+    "reason", ["step too small: the contact changes too fast", "largest number of points", "the mode ends here"]
+)
 def test_what_is_advised_after_a_march_can_be_set(tmp_path: Path, reason: str) -> None:
     """It was `wear.step.minimum`, a key of modes."""
     (tmp_path / "model.py").write_text(BUILDER.read_text())

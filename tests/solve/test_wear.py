@@ -166,6 +166,36 @@ def test_wear_that_accelerates_from_nothing_has_not_stopped(comm, stepper, above
     assert off[0] < 0.1 and off[1] < 0.4 * off[0] + 1e-4
 
 
+def test_a_march_has_an_end(comm):
+    """1e9 cycles in steps of one did not end."""
+    mode, y = node(comm)
+    march = fw.Wear(mode, y, 1e9, fw.WearControl(first=1e-3, fixed=True, max_points=20), [5e-3, 1.0, 2e9])
+    points = [(point.cycles, point.event) for point in march]
+    assert len(points) == 20 and not march.converged and march.reason == "largest number of points"
+    assert [event for _, event in points if event] == ["start", "report"] and points[-1][0] == march.eta < 1.0
+    assert [text.split(": ")[1].split(" of ")[0] for text in march.missed()] == [
+        f"the march ended at {march.eta:.6g}",
+        "beyond the last",
+    ]
+    assert list(march.go_on()) == []
+
+
+@pytest.mark.parametrize("reports", [[np.nan], [-1.0], ["soon"], [np.inf]])
+def test_reports_are_numbers_of_cycles(comm, reports):
+    mode, y = node(comm)
+    with pytest.raises(fw.InputError, match="report_at"):
+        fw.Wear(mode, y, 1.0, None, reports)
+
+
+def test_what_ends_before_a_report_says_so(comm):
+    mode, y = node(comm)
+    march = fw.Wear(mode, y, 1e5, fw.WearControl(tolerance=1e-2), [0.0, 1.0, 9e4, 2e5])
+    list(march)
+    assert "contact lost" in march.reason
+    assert [text.split(":")[0] for text in march.missed()] == ["report at 90000 cycles", "report at 200000 cycles"]
+    assert "2000 cycles" in march.missed(100.0)[1] and "beyond the last of 1000 cycles" in march.missed(100.0)[1]
+
+
 def test_errors(comm):
     mode, y = node(comm)
     with pytest.raises(fw.InputError, match="unknown stepper"):

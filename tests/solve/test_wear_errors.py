@@ -58,7 +58,8 @@ def test_a_script_has_them_where_it_asks_for_them(comm, errors):
     problem = mode.problem
     mode.destroy()
     branch = fw.follow(problem, 1e-3, 4e-3, report_at=[3.5e-3])
-    worn = fw.wear(branch, 3.5e-3, K_W, AREAS, 1.0, cycle_unit=CYCLES, report_at=[0.3], errors=errors)
+    worn = fw.wear(branch, 3.5e-3, K_W, AREAS, 1.0, cycle_unit=CYCLES, report_at=[0.3, 2.0], errors=errors)
+    assert worn.missed == ["report at 2 cycles: beyond the last of 1 cycles"] and worn.missed[0] in repr(worn)
     known = np.isfinite(worn["omega_error"])
     assert len(worn) > 4 and (known == ((worn["event"] != "") if errors is None else errors)).all()
     assert (known == np.isfinite(worn["lambda_error_harmonics"])).all()

@@ -25,7 +25,7 @@ from ..files.dimensions import names_of_data
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..results.results import AnalysisWriter, has_results, open_results
-from ..solve.steps import TOO_FAST, WearControl
+from ..solve.steps import TOO_FAST, TOO_MANY, WearControl
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs
@@ -77,6 +77,9 @@ class WearAnalysis(AnalysisSection):
         "-",
         "0.1",
         default=WearControl.pressure_change,
+    )
+    max_points: Whole = key(
+        "largest number of points at an amplitude", example="5000", default=WearControl.max_points, ge=2
     )
     report_at: list[Positive] = key(
         "normalised cycles at which the motion of a period is kept", "-", "[10.0, 40.0]", default_factory=list
@@ -213,11 +216,14 @@ def _collect(
         context.afterwards.append(lambda: shutil.rmtree(folder, ignore_errors=True))
     goal = f"{analysis.cycles:g} normalised cycles at every amplitude, or wear that stops"
     advice = _advice(context.name, reason) if failures else ""
-    return Outcome(writer.rows, reason, not failures, [result["summary"] for result in marched], goal, advice)
+    summary = [line for result in marched for line in (result["summary"], *result["missed"])]
+    return Outcome(writer.rows, reason, not failures, summary, goal, advice)
 
 
 def _advice(name: str, reason: str) -> str:
     """What helps a march that stopped before its goal."""
+    if TOO_MANY in reason:
+        return f"--set {name}.max_points=20000, a larger `tolerance` or `pressure_change`, or fewer cycles"
     if TOO_FAST in reason or "stage" in reason:
         return f"--set {name}.pressure_change=0.05, another stepper (--set {name}.stepper=tr_bdf2), or fewer cycles"
     return f"fewer cycles (what wore until then is kept), or other amplitudes (--set '{name}.amplitude=[...]')"

@@ -235,7 +235,7 @@ class _Solver:
             y = problem.core.unknowns()
             begin, end = y.getOwnershipRange()
             y.setArray(np.asarray(self._starts[settings.harmonics]["y_0"])[begin:end])
-            control = WearControl(a.stepper, settings.tolerance, settings.pressure_change)
+            control = WearControl(a.stepper, settings.tolerance, settings.pressure_change, max_points=a.max_points)
             march = Wear(worn, y, unit * a.cycles, control)
             y.destroy()
             return _follow(march, problem, np.concatenate(list(areas.values())))

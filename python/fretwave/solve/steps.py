@@ -61,8 +61,8 @@ class StepControl:
         return steps
 
 
-#: Why a step over wear cycles becomes too short.
-TOO_FAST = "the contact changes too fast"
+#: Why a step over wear cycles becomes too short, and why a march with many ends.
+TOO_FAST, TOO_MANY = "the contact changes too fast", "largest number of points"
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,7 @@ class WearControl:
         normal load at the start away
     pressure_change : largest change of a pair's mean normal force in a step, relative to that load
     first, fixed : length of the first step [cycles]; `fixed` for all steps, without control
+    max_points : of a march, which ends there
 
     Raises
     ------
@@ -88,6 +89,7 @@ class WearControl:
     pressure_change: float = 0.2
     first: float | None = None
     fixed: bool = False
+    max_points: int = 5000
 
     def __post_init__(self) -> None:
         from .steppers import STEPPERS
@@ -96,5 +98,8 @@ class WearControl:
         positive("wear.pressure_change", self.pressure_change)
         if self.first is not None:
             positive("wear.first", self.first)
+        if (whole(self.max_points) or 0) < 2:
+            expected = "a whole number >= 2"
+            raise InputError("a march needs two points", "wear.max_points", self.max_points, expected, "allow more")
         if self.stepper not in STEPPERS:
             raise InputError("unknown stepper", None, self.stepper, ", ".join(STEPPERS), "choose one of these")

@@ -11,9 +11,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..arrays import Array
-from ..given import positive
+from ..given import numbers, positive
 from .steppers import STEPPERS, StageDiverged, StageFailed, take
-from .steps import TOO_FAST, WearControl
+from .steps import TOO_FAST, TOO_MANY, WearControl
 from .worn_mode import WornMode, WornState
 
 #: Shortest step as a share of a first step at the present rates, and of the cycles done.
@@ -62,7 +62,7 @@ class Wear:
     cycles : float
         Where to stop.
     report_at : cycles that are met exactly
-    depth, at, step, load_scale, growth : (n_pairs,), cycles, length, [force], (n_pairs,) per cycle
+    depth, at, step, load_scale, growth, points : (n_pairs,), cycles, length, [force], (n_pairs,) per cycle, number
         To go on from an earlier march's point; by default the surfaces are new.
     outcome : Newton and linear iterations and residual that y was found with
     """
@@ -80,10 +80,13 @@ class Wear:
         load_scale: float | None = None,
         outcome: tuple[int, int, float] = (0, 0, 0.0),
         growth: Array | None = None,
+        points: int = 1,
     ) -> None:
         self.mode, self.control, self.cycles = mode, control or WearControl(), positive("cycles", cycles)
         self.tableau = STEPPERS[self.control.stepper]
+        self.asked = numbers("report_at", list(report_at), (len(report_at),), least=0.0)
         self.reports = sorted({*(value for value in report_at if value > at), cycles})
+        self.points = points
         self.eta, self.reason, self.converged = at, "", False
         start = np.zeros(len(mode.areas)) if depth is None else np.asarray(depth, dtype=float)
         mode.wear(start)
@@ -115,12 +118,25 @@ class Wear:
     def go_on(self) -> Iterator[WearPoint]:
         """The points after the present one."""
         while not self._finished():
+            if self.points >= self.control.max_points:
+                self.reason = TOO_MANY
+                return
             point = self._advance()
             if point is None:
                 return
+            self.points += 1
             if self._finished():
                 point.event = "stop"
             yield point
+
+    def missed(self, unit: float = 1.0) -> list[str]:
+        """Reports that were not met, each with its reason, in cycles of so many."""
+        told = []
+        for value in self.asked[self.asked > self.eta]:
+            beyond = f"beyond the last of {self.cycles / unit:.6g} cycles"
+            short = f"the march ended at {self.eta / unit:.6g}"
+            told.append(f"report at {value / unit:.6g} cycles: {beyond if value > self.cycles else short}")
+        return told
 
     def _finished(self) -> bool:
         """Stop rules: cycles done, contact lost, wear stopped.

@@ -39,6 +39,8 @@ class WearMarch(Table):
         It ended as asked.
     reason : str
         Why it ended.
+    missed : list of str
+        Reports that were asked for and not met, each with its reason.
     """
 
     def __init__(
@@ -54,13 +56,14 @@ class WearMarch(Table):
         cycle_unit: float,
         converged: bool,
         reason: str,
+        missed: Sequence[str] = (),
     ) -> None:
         super().__init__(columns, values)
         self.contacts = contacts
         self.depth, self.rate, self.load = depth, rate, load
         self.areas = areas
         self.cycle_unit = cycle_unit
-        self.converged, self.reason = converged, reason
+        self.converged, self.reason, self.missed = converged, reason, list(missed)
 
     @property
     def volume(self) -> Array:
@@ -69,7 +72,8 @@ class WearMarch(Table):
 
     def __repr__(self) -> str:
         ended = "as asked" if self.converged else "before its end"
-        return f"WearMarch of {len(self)} points, ended {ended}: {self.reason}\n{self.text()}"
+        lines = [f"WearMarch of {len(self)} points, ended {ended}: {self.reason}", self.text()]
+        return "\n".join([*lines, *(f"missed: {text}" for text in self.missed)])
 
 
 def wear(
@@ -157,6 +161,7 @@ def wear(
         cycle_unit=unit,
         converged=march.converged,
         reason=march.reason,
+        missed=march.missed(unit),
     )
 
 

@@ -152,7 +152,7 @@ class _Marcher:
         from ...solve.wear import Wear
 
         a, unit = self.analysis, self.unit
-        control = WearControl(a.stepper, a.tolerance, a.pressure_change)
+        control = WearControl(a.stepper, a.tolerance, a.pressure_change, max_points=a.max_points)
         reports = [unit * value for value in a.report_at]
         state, _, found = open_branch(self.comm, self.writer, True)
         y = self.problem.core.unknowns()
@@ -160,7 +160,7 @@ class _Marcher:
             fill(y, None if state is None else state["y"])
             names = ("depth", "at", "step", "load_scale", "growth")
             kept = state and {key: np.asarray(state[key]) for key in names if key in state}
-            going: dict[str, Any] = self.comm.bcast(kept)
+            going: dict[str, Any] = {**self.comm.bcast(kept), "points": self.writer.rows}
         else:
             y.setArray(self.line.y[slice(*y.getOwnershipRange())])
             newton, linear, residual = self.line.outcome
@@ -227,6 +227,7 @@ class _Marcher:
             "reason": march.reason,
             "summary": f"{self.context.name}: a = {self.line.amplitude:g} {length}: {self.writer.rows} points to"
             f" {end:.4g} normalised cycles, {march.reason}{told}",
+            "missed": [f"{self.context.name}: missed: {text}" for text in march.missed(self.unit)],
             "labels": " ".join(self.problem.harmonics.labels),
             "samples": self.problem.harmonics.samples,
             "load_scale": march.load_scale,
