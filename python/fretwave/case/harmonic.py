@@ -40,8 +40,9 @@ class HarmonicSection(AnalysisSection):
 
     harmonics: Whole = key("highest harmonic", example="21", ge=1)
     accuracy: Optional[Positive] = key(
-        "relative accuracy of damping and frequency, or of the amplitude of a response: it chooses harmonics and "
-        "samples point by point, in place of the keys",
+        "relative accuracy: how far a point may lie from the true branch, in damping, frequency and amplitude of a "
+        "mode or amplitude and frequency of a response (where that is steep the error at the same amplitude is "
+        "larger); it chooses harmonics and samples point by point, in place of the keys",
         example="1e-3",
         default=None,
         lt=1,

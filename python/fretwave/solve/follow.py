@@ -61,7 +61,8 @@ def follow(
         Relative, of zeta and omega of a mode (zeta below 1e-4: of that), of the complex amplitude of a response: the
         branch takes as many harmonics and samples as that needs, no less than the problem's, and other ones along its
         way (columns `harmonics` and `samples`). It is converged if no more than 5 % of its points miss it by their
-        estimated error.
+        estimated error: by the distance from the true branch, in these and the parameter. Where the branch is steep
+        the error at the same parameter is larger.
     observe : dict, optional
         Further columns by name: the fundamental's amplitude of a dof, of a row (n_dof,) or of a linear mode's
         coordinate, or "energy", the mechanical energy of the vibration, mean over a period [energy].
