@@ -200,7 +200,7 @@ TIED = fw.Sector.from_faces(np.eye(3), np.diag([1.0, 2.0, 1.0]), [0], [2], 6)
 
 @pytest.mark.parametrize("sector", [SECTOR, TIED], ids=["alone", "tied"])
 @pytest.mark.parametrize(
-    "q", [1.0, [1.0], [1.0, 2.0, 3.0], [[1.0, 2.0]], np.eye(2), "ab", [np.nan, 1.0], None], ids=str
+    "q", [1.0, [1.0], [1.0, 2.0, 3.0], [[1.0, 2.0]], np.eye(2).tolist(), "ab", [np.nan, 1.0], None], ids=str
 )
 def test_a_wave_is_given_by_the_dofs_of_a_sector(q: Any, sector: fw.Sector) -> None:
     """Three numbers went round the wheel as a sector of three dofs."""
