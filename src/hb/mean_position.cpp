@@ -16,8 +16,8 @@ constexpr char const* free_mean =
     "the mean position is free: every pair that held it slips or opens within a period";
 constexpr double mostly = 0.9;   // of a step's square: it is one in the mean
 constexpr double far = 1e4;      // motions: nothing that moves so little shifts its mean there
-constexpr double clearly = 1e6;  // times that, dof by dof: no motion that K leaves free
-constexpr double unsure = 10;  // times the least that K does not know: 3 are seen (a printed matrix, reduced)
+constexpr double unsure = 10;    // uncertainties of K: 3 are seen (of a printed matrix, reduced)
+constexpr double clearly = 1e6;  // of these, dof by dof: no motion that K leaves free
 
 /// The mean of the motion of all dofs, each in the first of the entries of its block.
 VecHandle mean_of(model::Model const& model, int block, Vec blocks) {

@@ -73,10 +73,9 @@ std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
 
 /// Of a trial or its tangent; what lies on a way may stand far from where it ends.
 std::string Continuation::adrift(Trial const& trial) {
-  std::string why;
-  if (!way_) why = problem_.adrift(trial.y, trial.y);
-  if (!way_ && why.empty()) why = problem_.adrift(trial.y, trial.tangent);
-  return why;
+  if (way_) return {};
+  const std::string stands = problem_.adrift(trial.y, trial.y);
+  return stands.empty() ? problem_.adrift(trial.y, trial.tangent) : stands;
 }
 
 /// Newton on the system closed by row . y = value, then the unit tangent there, oriented along `tangent_row`.
