@@ -219,6 +219,30 @@ def test_numbers_that_look_wrong_beside_others(tmp_path: Path, capfd, override: 
     assert all(word in warning for word in words), warning
 
 
+@pytest.mark.parametrize(("stiffness", "said"), [(5e-5, False), (5e-6, True)])
+def test_a_contact_softer_than_its_node_alone_holds(tmp_path: Path, capfd, stiffness: float, said: bool) -> None:
+    """At the end of ten unit springs in a row, 1/10 together, a spring k is the share k / (k + 1/10): 5e-4 or 5e-5."""
+    n = 10
+    chain = np.diag([2.0] * (n - 1) + [1.0]) - np.eye(n, k=1) - np.eye(n, k=-1)
+    text = f"""
+[model]
+dofs = {[f"x{k}" for k in range(n)]}
+M = {np.eye(n).tolist()}
+K = {chain.tolist()}
+[[contact]]
+name = "end"
+law = "jenkins"
+pairs = ["x9"]
+tangential_stiffness = {stiffness}
+friction_limit = 1.0
+[[analysis]]
+name = "modes"
+type = "linear"
+"""
+    assert call("check", put(tmp_path, text), "--no-solve") == 0
+    assert ("contact 'end' is far softer" in capfd.readouterr().out) == said
+
+
 @pytest.mark.parametrize(
     "override",
     ["contact.pad.normal_stiffness=1.9e4", "contact.pad.friction_coefficient=2.0", "contact.pad.gap=-1.0"],

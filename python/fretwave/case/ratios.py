@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.sparse.linalg
 
 from ..arrays import Array
 from ..errors import InputError
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Contact stiffness over the structure's below which its pairs hold nothing.
 SOFT = 1e-4
+#: Dofs and rows up to which it is looked at what pairs bear of a force, by a factor of K.
+FEW = 20_000, 500
 #: Largest amplitude over the model's size: linear elasticity and contact of fixed pairs end before.
 LARGE = 0.1
 #: Of dry metals 0.1 to 1.5.
@@ -48,6 +51,20 @@ def own_stiffness(case: Case, contact: Contact) -> Array:
         stiffness = 1 / np.asarray(total)
     stiffness[~np.isfinite(stiffness) | (stiffness <= 0)] = np.nan
     return stiffness.reshape(-1, contact.components)
+
+
+def borne(K: sp.spmatrix, B: sp.spmatrix, stiffness: Array) -> float:
+    """Largest share of the stiffness of any motion that springs k along rows of B can be, at most.
+
+    That is the largest eigenvalue of (K + B^T k B)^-1 B^T k B, below its trace sum k_i b_i^T (K + B^T k B)^-1 b_i; 1
+    where nothing else holds K.
+    """
+    held = sp.csc_matrix(K + B.T @ sp.diags(stiffness) @ B)
+    try:
+        moved = scipy.sparse.linalg.splu(held).solve(B.T.toarray())
+    except RuntimeError:  # singular
+        return 1.0
+    return float(stiffness @ np.einsum("ij,ji->i", B.toarray(), moved))
 
 
 def _of_contact(case: Case, contact: Contact) -> Iterator[InputError]:
@@ -87,7 +104,7 @@ def _of_stiffness(case: Case, contact: Contact, role: Role, own: Array) -> Itera
         (np.nanargmax, np.nanmax(ratio) > STIFF, "stiffer", "a softer contact, which solvers bear better"),
         (np.nanargmin, np.nanmin(ratio) < SOFT, "softer", "a stiffer contact: this one holds nothing"),
     ):
-        if beyond:
+        if beyond and not (word == "softer" and _holds(case, contact, role)):
             pair, unit = int(extreme(ratio)), case.units("force/length")
             value = float(np.broadcast_to(given, own.shape)[pair])
             yield InputError(
@@ -97,6 +114,18 @@ def _of_stiffness(case: Case, contact: Contact, role: Role, own: Array) -> Itera
                 f"{SOFT:g} to {STIFF:g} times",
                 f"look at its units; else {fix}",
             )
+
+
+def _holds(case: Case, contact: Contact, role: Role) -> bool:
+    """Whether a contact softer than its nodes is none that holds nothing: a beam's tip is as much softer than they."""
+    rows = [k for k in range(contact.components) if contact.info.stiffness_along(k) == role]
+    B = sp.csr_matrix(by_sector(contact.B)[0])
+    n_pairs = B.shape[0] // contact.components
+    along = B[np.add.outer(contact.components * np.arange(n_pairs), rows).ravel()]
+    if case.K.shape[0] > FEW[0] or along.shape[0] > FEW[1]:
+        return False
+    given = np.broadcast_to(contact.value(role), n_pairs)
+    return borne(case.K, along, np.repeat(given, len(rows))) > SOFT
 
 
 def _of_loads(case: Case, contact: Contact) -> Iterator[InputError]:
