@@ -219,11 +219,13 @@ def test_a_blade_does_not_take_the_peak_of_the_one_that_is_observed():
     shape = lambda at: 1 / np.sqrt(1 + 400 * (omega - at) ** 2)  # noqa: E731
     event = np.array(["", "", "peak", "", ""])
     table = {"level": np.ones(5), "omega": omega, "amplitude": shape(2.0), "event": event}
+    table["amplitude_error"] = 0.01 * shape(2.0)
     tuned = {"level": np.ones(5), "frequency_hz": omega / (2 * np.pi), "amplitude": shape(2.0), "event": event}
     blades = np.column_stack([shape(2.0), 0.5 * shape(2.0), shape(2.004)])
     peaks, each = blade_tables(table, blades, tuned)
     assert each["amplitude"].tolist() == [1.0, 0.5, pytest.approx(1.0, rel=SOLVED)]
     assert 2 * np.pi * each["frequency_hz"] == pytest.approx(np.array([2.0, 2.0, 2.004]), rel=SOLVED)
+    assert each["amplitude_error"] == pytest.approx(0.01 * each["amplitude"], rel=SOLVED), "1/a^2 is a parabola"
 
 
 @pytest.mark.ranks(1)

@@ -143,6 +143,16 @@ def test_linear_resonance_peaks_at_the_resonance_frequency_and_is_in_quadrature_
     assert turn.omega == pytest.approx(25.0, rel=1e-5)
 
 
+@pytest.mark.parametrize("step", [0.05, 0.2, 0.5])
+def test_a_peak_read_off_between_points_states_its_error(step):
+    """Of 1/a^2 = 1 + x^2 + 0.3 x^3 + 0.1 x^4, whose peak is 1 at x = 0: within a factor of 3 of the true one."""
+    omega = 10 + step * (np.arange(-4, 5) + 0.37)
+    x = omega - 10
+    peak = amplitude_peak(omega, (1 + x**2 + 0.3 * x**3 + 0.1 * x**4) ** -0.5)
+    assert 1 / 3 < peak.error / abs(peak.amplitude - 1) < 3
+    assert np.isnan(amplitude_peak(omega[3:6], (1 + x[3:6] ** 2) ** -0.5).error), "no fourth point tells"
+
+
 def test_peak_at_the_end_of_the_range_is_no_peak():
     nowhere = located_peak(np.arange(5.0), np.arange(5.0), np.array(["", "peak", "", "", ""]))
     assert np.isnan(nowhere.omega)
@@ -153,7 +163,9 @@ def test_peaks_of_a_linear_oscillator_lie_on_its_backbone():
     amplitude = np.geomspace(1e-3, 1.0, 20)
     omega = np.full(20, 25.0 * np.sqrt(1.0 - 0.02**2))
     mode = ModeCurve(amplitude, omega, np.full(20, 25.0), np.full(20, 0.02))
-    table = peak_table(linear_response(), {"mode": mode})
+    response = linear_response()
+    table = peak_table({**response, "amplitude_error": 0.01 * response["amplitude"]}, {"mode": mode})
+    assert table["amplitude_error"] == pytest.approx(0.01 * table["amplitude"])
     # the largest amplitude is at omega0 sqrt(1 - 2 zeta^2), the damped frequency at omega0 sqrt(1 - zeta^2)
     assert table["distance_mode"][0] == pytest.approx(-0.5 * 0.02**2, rel=0.05)
     assert abs(table["quadrature_distance_mode"][0]) < 1e-5

@@ -16,17 +16,20 @@ def blade_tables(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """``<name>_peaks.csv``, a row for each level, and ``<name>_blades.csv``, one for each level and sector.
 
-    Where no blade has a peak within the frequency range the sector is -1.
+    Where no blade has a peak within the frequency range the sector is -1. The error of an amplitude is that of reading
+    it off between points, and the share of the observed sector's at its largest response, as if all moved as one mode.
 
     Parameters
     ----------
-    table : columns level and omega, (points,)
+    table : columns level, omega and amplitude, amplitude_error if it has one, (points,)
     blades : (points, N)
     """
     levels = np.unique(table["level"])
     before = [_peak(tuned, level, 2 * np.pi * tuned["frequency_hz"], tuned["amplitude"]) for level in levels]
     each = [[_peak(table, level, table["omega"], blade) for blade in blades.T] for level in levels]
     amplitude = np.array([[peak.amplitude for peak in row] for row in each])
+    share = np.array([_share_of_error(table, level) for level in levels])
+    error = np.array([[peak.error for peak in row] for row in each]) + share[:, None] * amplitude
     frequency = np.array([[peak.omega for peak in row] for row in each]) / (2 * np.pi)
     tuned_amplitude = np.array([peak.amplitude for peak in before])
     most = np.array([largest(np.nan_to_num(row)) for row in amplitude])
@@ -35,6 +38,7 @@ def blade_tables(
         "level": levels,
         "frequency_hz": frequency[rows, most],
         "amplitude": amplitude[rows, most],
+        "amplitude_error": error[rows, most],
         "sector": np.where(np.isnan(amplitude).all(axis=1), -1, most),
         "tuned_frequency_hz": np.array([peak.omega for peak in before]) / (2 * np.pi),
         "tuned_amplitude": tuned_amplitude,
@@ -46,6 +50,7 @@ def blade_tables(
         "sector": np.tile(np.arange(sectors), len(levels)),
         "frequency_hz": frequency.ravel(),
         "amplitude": amplitude.ravel(),
+        "amplitude_error": error.ravel(),
         "amplification": (amplitude / tuned_amplitude[:, None]).ravel(),
     }
 
@@ -72,6 +77,15 @@ def _peak(table: Mapping[str, Array], level: float, omega: Array, amplitude: Arr
         return NOWHERE
     own = "event" in table and _alike(amplitude[rows], table["amplitude"][rows])
     return amplitude_peak(omega[rows], amplitude[rows], table["event"][rows] if own else None)
+
+
+def _share_of_error(table: Mapping[str, Array], level: float) -> float:
+    """The stated error of the observed amplitude where that is largest, over it; 0 where none is stated."""
+    rows = table["level"] == level
+    if "amplitude_error" not in table:
+        return 0.0
+    top = int(np.argmax(table["amplitude"][rows]))
+    return float(table["amplitude_error"][rows][top] / table["amplitude"][rows][top])
 
 
 def _alike(amplitude: Array, observed: Array) -> bool:

@@ -18,29 +18,39 @@ TOP = 0.9
 
 @dataclass(frozen=True)
 class Peak:
-    """A place of a response curve: excitation frequency [rad/s] and fundamental amplitude; nan where there is none."""
+    """A place of a response curve: excitation frequency [rad/s] and fundamental amplitude; nan where there is none.
+
+    `error` is what the amplitude may be wrong by, nan where that is not known.
+    """
 
     omega: float
     amplitude: float
+    error: float = 0.0
 
 
-NOWHERE = Peak(np.nan, np.nan)
+NOWHERE = Peak(np.nan, np.nan, np.nan)
 
 
-def located_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_]) -> Peak:
-    """Largest amplitude of a response, located on its branch (event ``peak``); none at the ends of the range."""
+def located_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_], error: Array | float = np.nan) -> Peak:
+    """Largest amplitude of a response, located on its branch (event ``peak``); none at the ends of the range.
+
+    Parameters
+    ----------
+    error : stated of each amplitude
+    """
     top = int(np.argmax(amplitude))
     peaks = np.flatnonzero(["peak" in text.split() for text in event])
     if top in (0, len(amplitude) - 1) or not len(peaks):
         return NOWHERE
     highest = peaks[np.argmax(amplitude[peaks])]
-    return Peak(float(omega[highest]), float(amplitude[highest]))
+    return Peak(float(omega[highest]), float(amplitude[highest]), float(np.broadcast_to(error, len(omega))[highest]))
 
 
 def amplitude_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_] | None = None) -> Peak:
     """Largest amplitude of a motion that need not be observed (a blade of many); none at the ends of the range.
 
-    Where it lies on a located peak of its own (`event`), it is that point. Elsewhere 1/a^2, which is almost a parabola
+    The error is that of reading the amplitude off. Where it lies on a located peak of its own (`event`), it is that
+    point. Elsewhere 1/a^2, which is almost a parabola
     of the frequency at a resonance, is drawn through the three points around the largest one. Across the top of a
     response the frequency never turns round, even where the curve folds.
     """
@@ -49,14 +59,31 @@ def amplitude_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_] |
         return NOWHERE
     if event is not None and "peak" in str(event[top]).split():
         return Peak(float(omega[top]), float(amplitude[top]))
-    offset = omega[top - 1 : top + 2] - omega[top]
+    offset = omega - omega[top]
     with np.errstate(all="ignore"):
-        inverse = amplitude[top - 1 : top + 2] ** -2.0
-    if len(np.unique(offset)) < 3 or not np.all(np.isfinite([*offset, *inverse])):
+        inverse = amplitude**-2.0
+    around = slice(top - 1, top + 2)
+    if not _apart(offset[around]) or not np.all(np.isfinite([*offset[around], *inverse[around]])):
         return NOWHERE
-    curve = np.polyfit(offset, inverse, 2)
+    curve = np.polyfit(offset[around], inverse[around], 2)
     place = -0.5 * curve[1] / curve[0]
-    return Peak(float(omega[top] + place), float(np.polyval(curve, place) ** -0.5))
+    height = float(np.polyval(curve, place) ** -0.5)
+    return Peak(float(omega[top] + place), height, 0.5 * height**3 * _left_out(offset, inverse, top, place))
+
+
+def _apart(values: Array) -> bool:
+    return len(np.unique(values)) == len(values)
+
+
+def _left_out(x: Array, y: Array, top: int, place: float) -> float:
+    """What the next term of Newton's interpolation adds to the parabola through three points about `top`.
+
+    By the point beyond them on either side, the larger; nan where there is none.
+    """
+    sides = [slice(first, first + 4) for first in (top - 2, top - 1) if 0 <= first <= len(x) - 4]
+    known = [side for side in sides if _apart(x[side]) and np.all(np.isfinite(y[side]))]
+    third = [np.polyfit(x[side], y[side], 3)[0] for side in known]
+    return float(max(np.abs(third), default=np.nan) * np.prod(np.abs(place - x[top - 1 : top + 2])))
 
 
 def quadrature(omega: Array, amplitude: Array, phase: Array) -> Peak:
@@ -99,9 +126,11 @@ def peak_table(forced: Mapping[str, Array], modes: Mapping[str, ModeCurve]) -> d
     """
     levels = np.unique(forced["level"])
     rows = [{key: value[forced["level"] == level] for key, value in forced.items()} for level in levels]
-    peaks = [located_peak(row["omega"], row["amplitude"], row["event"]) for row in rows]
+    stated = [row.get("amplitude_error", np.nan) for row in rows]
+    peaks = [located_peak(row["omega"], row["amplitude"], row["event"], error) for row, error in zip(rows, stated)]
     turns = [quadrature(row["omega"], row["amplitude"], row["phase"]) for row in rows]
-    table = {"level": levels, **_columns("", peaks), **_columns("quadrature_", turns)}
+    error = {"amplitude_error": np.array([peak.error for peak in peaks])}
+    table = {"level": levels, **_columns("", peaks), **error, **_columns("quadrature_", turns)}
     for name, mode in modes.items():
         table[f"distance_{name}"] = np.array([distance(peak, mode, False) for peak in peaks])
         table[f"quadrature_distance_{name}"] = np.array([distance(turn, mode, True) for turn in turns])

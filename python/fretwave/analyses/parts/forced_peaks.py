@@ -9,7 +9,7 @@ from typing import Any
 from ...case.analysis import AnalysisSection
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import peak_table
-from .branch import largest_error
+from .branch import error_text, largest_error
 from .context import AnalysisContext
 
 
@@ -31,7 +31,8 @@ def write_peaks(
     unit = context.units(lengths)
     if not table:
         return []
-    peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase", "event")}, curves)
+    used = ("level", "omega", "amplitude", "phase", "event", "amplitude_error")
+    peaks = peak_table({key: table[key] for key in used}, curves)
     context.write_table("peaks", peaks, lengths)
     lines = [
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
@@ -48,7 +49,8 @@ def _peak_line(name: str, peak: dict[str, float], curves: list[str], unit: str) 
     text = f"{name}: level {peak['level']:g}: "
     if not math.isfinite(peak["amplitude"]):
         return text + "no peak within the frequency range"
-    text += f"peak a = {peak['amplitude']:.4g} {unit} at {peak['frequency_hz']:.5g} Hz"
+    error = error_text(peak["amplitude_error"]).rstrip()
+    text += f"peak a = {peak['amplitude']:.4g}{error} {unit} at {peak['frequency_hz']:.5g} Hz"
     return "".join([text, *(_distance(peak[f"distance_{curve}"], curve) for curve in curves)])
 
 
