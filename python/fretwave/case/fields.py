@@ -24,6 +24,7 @@ def _of_the_core(value: int) -> int:
 
 
 Whole = Annotated[int, AfterValidator(_of_the_core)]
+Counted = Annotated[Whole, Field(ge=1)]
 Dof = Annotated[
     str,
     BeforeValidator(lambda value: str(value) if type(value) is int else value),

@@ -16,6 +16,7 @@ from ..model.sizes import COMPARED_MODES, COMPONENT_MODES, INTERFACE_TOLERANCE, 
 from ..units import MM_T_S, SI, SYSTEMS
 from .fields import (
     ByMode,
+    Counted,
     Dof,
     Finite,
     Frequency,
@@ -310,17 +311,19 @@ class DistributionSection(Section):
 class StudySection(Section):
     """``[study]``: sweeps of ``fretwave study``, each with the others at their finest (of wear: as in the analysis)."""
 
-    harmonics: Optional[list[Whole]] = key("highest harmonics", example="[1, 3, 7, 21, 41]", default=None, min_length=2)
-    samples: Optional[list[Whole]] = key(
+    harmonics: Optional[list[Counted]] = key(
+        "highest harmonics", example="[1, 3, 7, 21, 41]", default=None, min_length=2
+    )
+    samples: Optional[list[Counted]] = key(
         "time samples of a period", example="[128, 512, 2048]", default=None, min_length=2
     )
-    component_modes: Optional[list[Whole]] = key(
+    component_modes: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
         "numbers of component modes, for a reduced model", example="[2, 5, 10, 20]", default=None, min_length=2
     )
     tolerance: Optional[list[Positive]] = key(
         "residual norms at which Newton stops", "-", "[1e-4, 1e-7, 1e-10]", default=None, min_length=2
     )
-    accuracy: Optional[list[Positive]] = key(
+    accuracy: Optional[list[Annotated[Positive, Field(lt=1)]]] = key(
         "accuracies that runs are asked for, in place of harmonics and samples", "-", "[1e-2, 1e-3]", default=None
     )
     wear_tolerance: Optional[list[Positive]] = key(

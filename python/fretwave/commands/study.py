@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..case.fields import LARGEST_WHOLE
 from ..console import Shown
 from ..run.study import COMPARED, REPEATS, run_study
 from .parser import Parser, add_force, add_shown
@@ -34,18 +36,33 @@ def resume_study(folder: Path, record: dict[str, Any], comm: MPI.Comm, shown: Sh
     return run_study(options, arguments, comm, record)
 
 
-def _list(kind: type) -> Any:
-    def parse(text: str) -> list[Any]:
-        return [kind(part) for part in text.split(",")]
+def _list(kind: type, least: int = 1, below: float = math.inf) -> Any:
+    """Numbers as the keys of [study] are: whole ones from the least up, others above 0 and below something."""
+    expected = f"whole numbers from {least} up" if kind is int else "numbers above 0"
+    expected += f" and below {below:g}" if below < math.inf else ""
 
-    parse.__name__ = f"list of {kind.__name__}"
+    def fits(value: float) -> bool:
+        return least <= value <= LARGEST_WHOLE if kind is int else 0 < value < below
+
+    def parse(text: str) -> list[Any]:
+        try:
+            values = [kind(part) for part in text.split(",")]
+        except ValueError:
+            values = []
+        if not values or not all(map(fits, values)):
+            raise argparse.ArgumentTypeError(f"{expected} are expected, with commas between, not {text}")
+        return values
+
     return parse
 
 
-def _several(text: str) -> int:
-    if not text.isdecimal() or int(text) < 2:
-        raise argparse.ArgumentTypeError(f"a whole number from 2 up is expected, not {text}")
-    return int(text)
+def _from(least: int) -> Any:
+    def parse(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"a whole number from {least} up is expected, not {text}")
+        return int(text)
+
+    return parse
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -63,21 +80,21 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--tolerance", type=_list(float), metavar="T,...", help="tolerances to sweep (of wear: of a step)"
     )
-    parser.add_argument("--accuracy", type=_list(float), metavar="A,...", help="accuracies to ask for")
+    parser.add_argument("--accuracy", type=_list(float, below=1.0), metavar="A,...", help="accuracies to ask for")
     parser.add_argument(
-        "--component-modes", type=_list(int), metavar="N,...", help="numbers of component modes to sweep"
+        "--component-modes", type=_list(int, 0), metavar="N,...", help="numbers of component modes to sweep"
     )
     parser.add_argument(
         "--pressure-change", type=_list(float), metavar="P,...", help="of wear: largest changes of pressure in a step"
     )
     parser.add_argument(
         "--places",
-        type=_several,
+        type=_from(2),
         default=COMPARED,
         metavar="N",
         help=f"amplitudes of a mode or frequencies at which runs are compared (default {COMPARED})",
     )
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="times each run is repeated (default 3)")
+    parser.add_argument("--repeats", type=_from(1), default=REPEATS, help="times each run is repeated (default 3)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
     add_shown(parser)
     add_force(parser)

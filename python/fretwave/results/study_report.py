@@ -51,7 +51,8 @@ _LEAST = f"{LEAST_ERROR:.0e}".replace("e-0", "e-")
 
 LEGEND = (
     "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
-    "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. Estimated is "
+    "all runs meet exactly once, divided by the peak (where there is no damping as they are); of omega the largest "
+    "relative one over the same. Estimated is "
     "the error of zeta by what the sweep changes, of the finest run by all, as the run itself says; within "
     f"{' and '.join(map(str, FACTORS))}: the share of the amplitudes at which the estimated error of lambda is within "
     f"that factor of the error, of those judged: where this is above {_LEAST} 1/s and {JUDGED:g} times what the finest "

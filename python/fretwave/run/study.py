@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..analyses.forced import ForcedAnalysis
@@ -17,7 +16,8 @@ from ..mpi.guard import on_first_rank
 from ..results.runfolder import read_copy
 from ..results.study_report import LEGEND, LEGEND_OF_RESPONSE, PRINTED, PRINTED_OF_RESPONSE, markdown
 from .study_folder import StudyFolder, publish
-from .study_plan import Plan, Settings, Study
+from .study_input import check_options, plan_of
+from .study_plan import Settings, Study
 from .study_solver import ModeSolver, ResponseSolver, Solver, Studied
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def run_study(
     """Run a study, or go on with it; returns the exit code. Collective."""
     case = on_first_rank(comm, lambda: _load(options, record))
     worn = options.analysis in case.analyses.of(WearAnalysis)
+    check_options(options, worn)
     chosen = None if worn else _analysis(case, options.analysis)
     with StudyFolder(case, options, arguments, comm, record) as folder:
         console = Console(comm.rank == 0, folder.log, shown=options.shown)
@@ -65,7 +66,7 @@ def _study_branch(
     console: Console,
     folder: StudyFolder,
 ) -> int:
-    plan = _plan(case, options)
+    plan = plan_of(case, options)
     solver = kind(case, analysis, comm, console, options.repeats, options.places)
     study = Study(plan, solver.places, solver.over)
     console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
@@ -74,9 +75,8 @@ def _study_branch(
         lambda settings: folder.solved(numbers[settings], solver.outcome, lambda: solver.solve(settings)),
         lambda sweep, settings: console.line(_progress(study, sweep, settings)),
     )
+    _check_reference(study, analysis)
     tables = {"study": study.table(), "calibration": study.calibration()}
-    if not tables["study"]:
-        raise _no_reference(study)
     text = markdown(tables["study"], _notes(study), *PRINTED_AS[study.over])
     folder.finish(lambda path: publish(path, tables, text, console))
     return EXIT_DONE
@@ -87,6 +87,9 @@ def _notes(study: Study) -> list[str]:
     if len(study.left_out):
         places = ", ".join(f"{a:.4g}" for a in study.left_out)
         notes.append(f"Left out, because some run has no or several solutions there: {places}.")
+    if study.plan.impossible:
+        left = ", ".join(_text(settings) for settings in study.plan.impossible)
+        notes.append(f"Not run, with fewer than two samples per period of the highest harmonic: {left}.")
     notes += [f"No whole branch with {_text(settings)}: {reason}." for settings, reason in study.failures.items()]
     return notes
 
@@ -106,14 +109,19 @@ def _text(settings: Settings) -> str:
     return f"H = {settings.harmonics}, N_t = {settings.samples}, tolerance {settings.tolerance:.0e}{modes}"
 
 
-def _no_reference(study: Study) -> NotConverged:
+def _check_reference(study: Study, analysis: Studied) -> None:
+    """There is something to measure errors against, and it moves."""
     finest = study.plan.reference
-    return NotConverged(
-        "the finest run of the study found no whole branch, so there is nothing to measure errors against",
-        where=_text(finest),
-        measured=study.failures.get(finest, "not run: fewer than two samples per period of the highest harmonic"),
-        fix="choose a less strict finest setting, for example --tolerance 1e-4,1e-8",
-    )
+    if finest in study.failures:
+        raise NotConverged(
+            "the finest run of the study found no whole branch, so there is nothing to measure errors against",
+            where=_text(finest),
+            measured=study.failures[finest],
+            fix="choose a less strict finest setting, for example --tolerance 1e-4,1e-8",
+        )
+    if study.outcomes[finest].unit == 0:
+        what, fix = "what is observed does not move: no error can be measured in its amplitude", "observe another dof"
+        raise InputError(what, f"{analysis.name}.observe", 0.0, "an amplitude above 0", fix)
 
 
 def _analysis(case: Case, name: str | None) -> tuple[type[Solver[Any]], Studied]:
@@ -127,19 +135,3 @@ def _analysis(case: Case, name: str | None) -> tuple[type[Solver[Any]], Studied]
         what, expected = "a study needs a mode, a forced response or wear", ", ".join(names) or None
         raise InputError(what, "--analysis", name, expected, fix)
     return found[str(chosen)]
-
-
-def _plan(case: Case, options: argparse.Namespace) -> Plan:
-    """Sweeps of the command line, else of the case's table [study], else the defaults."""
-    plan = Plan()
-    for name in ("harmonics", "samples", "tolerance", "component_modes", "accuracy"):
-        values = getattr(options, name) or getattr(case.study, name)
-        if name == "component_modes" and values and case.reduction is None:
-            raise InputError(
-                "the case is not reduced: there are no component modes to sweep",
-                "study.component_modes",
-                expected="a table [reduction]",
-                fix="add [reduction], or leave component_modes out",
-            )
-        plan = replace(plan, **{name: tuple(values)}) if values else plan
-    return plan

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array, Complex, Indices
 from ..hb.states import ZETA_FLOOR
+from ..post.mode_curve import without_rounding
 
 
 @dataclass(frozen=True)
@@ -65,14 +66,18 @@ class Outcome:
         return np.maximum(-true.real, ZETA_FLOOR * np.abs(true))
 
     def errors(self, true: Outcome, rows: Indices, its: Indices, estimate: Array) -> Mapping[str, float]:
-        """Columns of these rows against another run's, with what is estimated of them (m,)."""
+        """Columns of these rows against another run's, with what is estimated of them (m,).
+
+        Of damping they are over its peak; as they are where that is none, as of a mode that never slips.
+        """
+        peak = abs(without_rounding(true.peak_zeta)) or 1.0
         return {
             "omega_error": _largest(np.abs(self.omega[rows] / true.omega[its] - 1.0)),
-            "zeta_error": _largest(np.abs(self.zeta[rows] - true.zeta[its])) / abs(true.peak_zeta),
+            "zeta_error": _largest(np.abs(self.zeta[rows] - true.zeta[its])) / peak,
             "peak_zeta": self.peak_zeta,
             "peak_amplitude": self.peak_amplitude,
-            "peak_zeta_error": abs(self.peak_zeta / true.peak_zeta - 1.0),
-            "zeta_error_estimate": _largest(estimate / true.omega[its]) / abs(true.peak_zeta),
+            "peak_zeta_error": abs(self.peak_zeta - true.peak_zeta) / peak,
+            "zeta_error_estimate": _largest(estimate / true.omega[its]) / peak,
         }
 
 

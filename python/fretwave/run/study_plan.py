@@ -64,6 +64,14 @@ class Plan:
 
     def sweeps(self) -> list[tuple[str, Settings]]:
         """(name of the swept setting, settings) of every row of the table, coarse to fine."""
+        return [(name, settings) for name, settings in self._asked() if settings.possible()]
+
+    @property
+    def impossible(self) -> list[Settings]:
+        """What is asked for and cannot be run."""
+        return list(dict.fromkeys(settings for _, settings in self._asked() if not settings.possible()))
+
+    def _asked(self) -> list[tuple[str, Settings]]:
         finest = self.reference
         values: dict[str, Sequence[Any]] = {"harmonics": sorted(self.harmonics), "samples": sorted(self.samples)}
         values |= {"tolerance": sorted(self.tolerance)[::-1], "component_modes": sorted(self.component_modes)}
@@ -72,7 +80,7 @@ class Plan:
         if self.accuracy:
             sets = [(highest, default_samples(highest)) for highest in sorted(self.harmonics)]
             rows += [("set", replace(finest, harmonics=highest, samples=count)) for highest, count in sets]
-        return [(name, settings) for name, settings in rows if settings.possible()]
+        return rows
 
 
 @dataclass

@@ -164,7 +164,7 @@ def wear_plan(case: Case, analysis: WearAnalysis, options: argparse.Namespace) -
         given = dict(
             harmonics=section.harmonics, tolerance=section.wear_tolerance, pressure_change=section.pressure_change
         )
-    chosen = {name: tuple(values or ()) for name, values in given.items()}
+    chosen = {name: tuple(dict.fromkeys(values or ())) for name, values in given.items()}
     if not any(chosen.values()):
         chosen["tolerance"] = TOLERANCES
     swept = chosen["harmonics"], chosen["tolerance"], chosen["pressure_change"]
