@@ -50,6 +50,7 @@ def test_every_case_follows_it(file: Path) -> None:
     [
         (("analysis", 0), "harmnics", 3),
         (("analysis", 0), "harmonics", 0),
+        (("analysis", 0), "samples", 2),
         (("analysis", 0), "type", "mod"),
         (("analysis", 0), "amplitude", [1.0]),
         (("analysis", 0), "step", {"maximum": -1.0}),

@@ -47,6 +47,8 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
     "study": StudySection,
 }
 Schema = dict[str, Any]
+#: Bounds as pydantic writes them of a value that is checked beyond its type -> keywords of JSON schema.
+BOUNDS = {"ge": "minimum", "le": "maximum", "gt": "exclusiveMinimum", "lt": "exclusiveMaximum"}
 
 
 def json_schema(laws: Mapping[str, LawInfo]) -> Schema:
@@ -61,7 +63,7 @@ def json_schema(laws: Mapping[str, LawInfo]) -> Schema:
     properties["gauge"].update(type="array", items=_section(GaugeSection, definitions))
     properties["analysis"].update(type="array", minItems=1, items=_analysis(definitions))
     properties["quick"]["type"] = "object"
-    return {
+    found = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A case of fretwave",
         "type": "object",
@@ -70,6 +72,17 @@ def json_schema(laws: Mapping[str, LawInfo]) -> Schema:
         "additionalProperties": False,
         "$defs": definitions,
     }
+    return dict(_with_bounds(found))
+
+
+def _with_bounds(part: Any) -> Any:
+    """The same with bounds under names that JSON schema knows."""
+    if isinstance(part, list):
+        return [_with_bounds(one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    numbers = {name for name in BOUNDS if isinstance(part.get(name), (int, float))}
+    return {BOUNDS[key] if key in numbers else key: _with_bounds(value) for key, value in part.items()}
 
 
 def json_text(laws: Mapping[str, LawInfo]) -> str:
