@@ -97,6 +97,15 @@ def test_faces_of_a_wheel_enclose_its_volume(run: Path) -> None:
     assert still.sizes.max() == pytest.approx(max(first.largest(), second.largest()), rel=0.05)
 
 
+def test_a_sector_asked_for_twice_is_shown_once(run: Path, capfd) -> None:
+    """Faces that lie on each other are inside: of a sector drawn twice none would be left."""
+    said = []
+    for sectors in (["1"], ["1", "1"]):
+        assert call("view", run, "--png", "--sectors", *sectors, "--out", run / "once.png") == 0
+        said.append(capfd.readouterr().out)
+    assert said[0] == said[1] and " 0 faces" not in said[0]
+
+
 def test_a_picture_does_not_miss_contacts(run: Path, capfd) -> None:
     """It shows none; the file for ParaView would."""
     for words, missed in ((["--png"], False), ([], True)):

@@ -69,6 +69,13 @@ def test_shares_of_slip_are_the_table_s(run):
     assert fields["slip"].mean(axis=1) == pytest.approx(table["slip"], abs=LAST_DIGITS) and table["slip"].min() > 0.1
 
 
+def test_a_picture_of_wear_is_refused_before_anything_is_written(run, tmp_path, capfd):
+    assert call("view", run, "--analysis", "wear", "--png", "--out", tmp_path / "worn.png") == 2
+    told = capfd.readouterr()
+    assert "this is no motion to draw" in told.err and not told.out
+    assert not list(tmp_path.iterdir())
+
+
 def test_amplitudes_asked_for_are_files_of_their_own(run, tmp_path, capfd):
     out = tmp_path / "some.vtkhdf"
     assert call("view", run, "--analysis", "wear", "--amplitude", "2e-6", "2.9e-6", "--out", out) == 0

@@ -214,7 +214,7 @@ def _to_nodes(given: Structure, n_nodes: int, expand: Expand, beyond: Array) -> 
 
 
 def _shown(case: Case, around: int, asked: Sequence[int]) -> list[int]:
-    chosen = list(asked) or list(range(around))
+    chosen = list(dict.fromkeys(asked)) or list(range(around))
     wrong = [sector for sector in chosen if not 0 <= sector < around]
     if wrong:
         expected = f"0 to {around - 1}" if around > 1 else "a model with sectors"

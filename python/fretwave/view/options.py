@@ -52,6 +52,18 @@ class ViewOptions:
         """Nothing but the outer faces is needed."""
         return self.pvd or self.png or self.gif
 
+    def refuse_pictures(self, name: str) -> None:
+        """Of an analysis that shows something else than a motion, before anything is written.
+
+        Raises
+        ------
+        InputError
+            A picture or an animation is asked for.
+        """
+        if self.png or self.gif:
+            expected = "the motion at a point, or a file for ParaView"
+            raise InputError("this is no motion to draw", f"analysis '{name}'", None, expected, "--point N")
+
     @classmethod
     def checked(cls, scale: str, phases: int, **others: Any) -> ViewOptions:
         """From the words of the command line.

@@ -85,9 +85,7 @@ def _how(scale: float, options: ViewOptions) -> str:
 
 def _of_its_own(written: list[Path], name: str, options: ViewOptions, say: Callable[[str], None]) -> list[Path]:
     """Files of an analysis that shows something else than a motion."""
-    if options.png or options.gif:
-        expected = "the motion at a point, or a file for ParaView"
-        raise InputError("this is no motion to draw", f"analysis '{name}'", None, expected, "--point N")
+    options.refuse_pictures(name)
     if not options.pvd:
         return written
     found = [_series(path, _of(path, options), say) for path in written]

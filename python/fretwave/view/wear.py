@@ -42,8 +42,9 @@ def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Ca
     Raises
     ------
     InputError
-        The places of the pairs are not known, or there is no wear at such an amplitude.
+        The places of the pairs are not known, there is no wear at such an amplitude, or a picture is asked for.
     """
+    options.refuse_pictures(name)
     placed = _placed(case, name)
     out = options.out or folder / f"{name}_wear.vtkhdf"
     written = []
