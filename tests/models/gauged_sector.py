@@ -37,4 +37,5 @@ def build() -> Structure:
         low=face("low"),
         high=face("high"),
         axis="z",
+        parts={"all": K},
     )

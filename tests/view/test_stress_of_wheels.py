@@ -11,6 +11,8 @@ from command_line import call
 from models import gauged_sector
 from models.csv_columns import table
 
+from fretwave import open_run
+
 pytestmark = pytest.mark.ranks(1)
 pytest.importorskip("skfem")
 
@@ -67,3 +69,40 @@ def test_a_wave_and_the_whole_wheel_have_the_same_gauges(tmp_path: Path) -> None
         assert one[0] > 0
         np.testing.assert_allclose(one, one[0], rtol=1e-7)
         np.testing.assert_allclose(other, one[0], rtol=2e-5)  # each maximum is read off a parabola
+
+
+DRIVEN = """
+[damping]
+zeta = 0.002
+
+[[analysis]]
+name = "driven"
+type = "forced"
+wheel = true
+engine_order = 1
+mistuning = { of = "all", deviations = [0.03, 0.01, -0.012, -0.002, 0.004] }
+harmonics = 1
+samples = 60
+force = { tip = 1.0 }
+observe = "tip"
+levels = [1.0, 2.0]
+frequency = [2336.0, 2341.0]
+"""
+
+
+def test_the_amplitude_of_a_driven_wheel_is_that_of_any_sector(tmp_path: Path, capfd) -> None:
+    """The worst node is in the sector that moves most: beside it, the observed dof of sector 0 would say too little."""
+    shutil.copy(gauged_sector.__file__, tmp_path / "gauged_sector.py")
+    limits = "poisson_ratio = 0.3\nendurance_limit = 250e6\nultimate_strength = 600e6"
+    (tmp_path / "case.toml").write_text(CASE.replace("poisson_ratio = 0.3", limits) + DRIVEN)
+    assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    capfd.readouterr()
+    assert call("stress", tmp_path / "run") == 0
+    printed = capfd.readouterr().out
+    points = open_run(tmp_path / "run")["driven"]
+    gauges, limit = (table(tmp_path / "run" / f"driven_{end}.csv") for end in ("gauges", "goodman"))
+    np.testing.assert_array_equal(gauges["largest_amplitude"], points["largest_amplitude"])
+    top = int(np.argmax(gauges["goodman"]))
+    assert gauges["largest_amplitude"][top] > 1.05 * gauges["amplitude"][top]
+    assert limit["at_largest_amplitude"][1] == points["largest_amplitude"][top]
+    assert f"at point {top}, amplitude {points['largest_amplitude'][top]:.5g} m of any sector" in printed

@@ -12,8 +12,9 @@ from ..columns import Column
 from ..errors import InputError
 from ..files.csv_table import table_text
 from ..files.whole import replace_text
+from ..results.overview import amplitude_column, whose_amplitude
 from ..texts import counted, display
-from ..view.endurance import AT_LIMIT, BEFORE, YES, endurance
+from ..view.endurance import BEFORE, YES, endurance, told_at_limit
 from ..view.stress import StressTable, stress_tables
 
 #: Names of the tables, behind that of the analysis.
@@ -51,7 +52,7 @@ def lines(table: StressTable) -> Iterator[str]:
         yield table.note
     for name in known:
         if name.endswith("_strain") and len(table.rows):
-            yield _of_gauge(table, name, known["amplitude"])
+            yield _of_gauge(table, name, known[amplitude_column(known)])
     if "stress_amplitude" in table and len(table.rows):
         yield _of_stress(table, known)
     columns, rows = endurance(table)
@@ -61,7 +62,7 @@ def lines(table: StressTable) -> Iterator[str]:
 
 
 def _at(table: StressTable, k: int, amplitude: Column) -> str:
-    return f"at point {k}, amplitude {table['amplitude'][k]:.5g} {amplitude.symbol}"
+    return f"at point {k}, amplitude {table[amplitude.name][k]:.5g} {amplitude.symbol}{whose_amplitude(table)}"
 
 
 def _of_gauge(table: StressTable, name: str, amplitude: Column) -> str:
@@ -82,7 +83,7 @@ def _of_stress(table: StressTable, known: Mapping[str, Column]) -> str:
     sector = f" of sector {row['worst_sector']}" if "worst_sector" in row else ""
     mean = _mean(row["mean_stress"], row["stress_amplitude"])
     values = f"amplitude {row['stress_amplitude']:.5g} {unit} about a mean of {mean} {unit}"
-    return f"worst stress: {values}, node {row['worst_node']}{sector}, {_at(table, k, known['amplitude'])}"
+    return f"worst stress: {values}, node {row['worst_node']}{sector}, {_at(table, k, known[amplitude_column(known)])}"
 
 
 def _of_level(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -100,9 +101,11 @@ def _of_limit(row: Mapping[str, Any], units: Mapping[str, str]) -> str:
     """Of one branch."""
     parts = [f"{name.replace('_', ' ')} {row[name]:g}" for name in ("level", "nodal_diameter", "line") if name in row]
     of = f"{', '.join(parts)}: " if parts else ""
-    largest = f"largest {row['largest_goodman']:.4g} at {row['at_amplitude']:.5g} {units['at_amplitude']}"
+    known = [name.removeprefix("limit_") for name in row if name.startswith("limit_")]
+    at = f"at_{amplitude_column(known)}"
+    largest = f"largest {row['largest_goodman']:.4g} at {row[at]:.5g} {units[at]}{whose_amplitude(known)}"
     if row["reached"] == YES:
-        told = (f"{row[f'limit_{name}']:.6g} {units[f'limit_{name}']}" for name in AT_LIMIT if f"limit_{name}" in row)
+        told = (f"{row[f'limit_{name}']:.6g} {units[f'limit_{name}']}" for name in told_at_limit(known))
         return f"{of}Goodman factor 1 at {', '.join(told)}; {largest}"
     if row["reached"] == BEFORE:
         return f"{of}Goodman factor above 1 from the first point on; {largest}"

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ..post.fatigue import first_reaching
 from ..results.analysis import Analysis, Table
+from ..results.overview import amplitude_column, whose_amplitude
 from ..results.parts import PARTS, rows_of_branches
 from ..results.reader import Run
 from . import scales, style
@@ -17,12 +18,14 @@ from .scales import Scale
 
 #: Columns that are stresses.
 STRESSES = ("stress_amplitude", "mean_stress")
+#: Axes that are no amplitude.
+OVER = {"frequency_hz": "Frequency", "cycles": "Wear cycles"}
 #: Microstrain of a strain.
 MICRO = 1e6
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
-    """Of each analysis with a table of gauges; of a forced response over frequency, of all others over amplitude."""
+    """Of each analysis with a table of gauges: responses over frequency, wear over cycles, others over amplitude."""
     for analysis in run.analyses.values():
         table = run.table_since(f"{analysis.name}_gauges")
         if table is not None and len(table["amplitude"]) > 1:
@@ -33,9 +36,10 @@ def draw(analysis: Analysis, table: Table) -> Figure:
     """A panel each for strain, stress and Goodman's factor, as far as the table has them."""
     gauges = [name for name in table if name.endswith("_strain")]
     panels = [*(["strain"] if gauges else []), *(name for name in ("stress_amplitude", "goodman") if name in table)]
-    over = "frequency_hz" if analysis.kind == "forced" else "amplitude"
-    scale = scales.logarithmic(analysis.unit_system, analysis.unit("amplitude"), table["amplitude"])
-    table = {**table, "amplitude": scale(table["amplitude"])}
+    over = "frequency_hz" if analysis.kind == "forced" else "cycles" if "cycles" in table else "amplitude"
+    own = amplitude_column(table)
+    scale = scales.logarithmic(analysis.unit_system, analysis.unit(own), table[own])
+    table = {**table, own: scale(table[own])}
     stress = _stresses(analysis, table)
     table = {name: stress(values) if name in STRESSES else values for name, values in table.items()}
     figure, axes = style.new_figure(1.2 + 2.6 * len(panels), rows=len(panels), sharex=True, squeeze=False)
@@ -43,7 +47,7 @@ def draw(analysis: Analysis, table: Table) -> Figure:
     for place, panel in zip(axes[:, 0], panels):
         for number, rows in enumerate(branches):
             branch = {name: values[rows] for name, values in table.items()}
-            _draw(place, panel, gauges, branch, over, number)
+            _draw(place, panel, gauges, branch, over, number, scale.unit)
             if panel == "goodman":
                 _limit(place, branch, over, number, scale.unit)
         place.set_ylim(bottom=0.0)
@@ -51,7 +55,7 @@ def draw(analysis: Analysis, table: Table) -> Figure:
         place.set_ylabel(_label(panel, stress))
     if over == "amplitude":
         style.log_amplitude(axes[-1, 0], table[over])
-    what = "Frequency" if over == "frequency_hz" else f"Amplitude of {analysis.observed()}"
+    what = OVER.get(over) or f"Amplitude of {analysis.observed()}"
     axes[-1, 0].set_xlabel(scale.label(what) if over == "amplitude" else style.label(what, analysis.unit(over)))
     for place in axes[:, 0]:
         style.legend(place, loc="best")
@@ -64,9 +68,12 @@ def _stresses(analysis: Analysis, table: Table) -> Scale:
     return scales.linear(analysis.unit_system, symbol, *(table[name] for name in STRESSES if name in table))
 
 
-def _draw(place: Axes, panel: str, gauges: list[str], table: Table, over: str, number: int) -> None:
-    """One branch in one panel."""
-    said = ", ".join(f"{name.replace('_', ' ')} {table[name][0]:g}" for name in PARTS if name in table)
+def _draw(place: Axes, panel: str, gauges: list[str], table: Table, over: str, number: int, unit: str) -> None:
+    """One branch in one panel; of wear it is named by its amplitude."""
+    named = {name: f"{name.replace('_', ' ')} {table[name][0]:g}" for name in PARTS if name in table}
+    if over == "cycles":
+        named["line"] = style.with_unit(style.number(float(table["amplitude"][0])), unit)
+    said = ", ".join(named.values())
     look = {"marker": ".", "markersize": 4, "lw": 1.2}
     if panel == "strain":
         for k, name in enumerate(gauges):
@@ -84,9 +91,10 @@ def _limit(place: Axes, table: Table, over: str, number: int, unit: str) -> None
     """The line at 1, and where the branch first passes it."""
     if number == 0:
         place.axhline(1.0, color=style.RED, lw=1.2, ls="--", label="limit")
-    passed = first_reaching(table["goodman"], 1.0, table[over], table["amplitude"])
+    passed = first_reaching(table["goodman"], 1.0, table[over], table[amplitude_column(table)])
     if passed is not None:
-        words = f"reached at an amplitude of {style.with_unit(style.number(passed[1]), unit)}"
+        at = f"at an amplitude{whose_amplitude(table)} of {style.with_unit(style.number(passed[1]), unit)}"
+        words = f"reached {f'after {style.number(passed[0])} cycles' if over == 'cycles' else at}"
         place.plot(passed[0], 1.0, marker="*", ms=11, ls="", color=style.ORANGE, mec=style.INK, label=words)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,19 +10,19 @@ import numpy as np
 from ..arrays import Array, Indices
 from ..columns import Column
 from ..post.fatigue import first_reaching
+from ..results.overview import amplitude_column
 from ..results.parts import PARTS, rows_of_branches
 from .stress import StressTable
 
 #: Whether a branch reaches the limit.
 YES, NO, BEFORE = "yes", "no", "before its first point"
-LARGEST = (
-    Column("largest_goodman", "1", "largest Goodman factor of the branch"),
-    Column("at_amplitude", "length", "amplitude of the largest factor"),
+LARGEST = Column("largest_goodman", "1", "largest Goodman factor of the branch")
+REACHED = (
     Column("worst_node", "1", "node of the largest factor", "i"),
     Column("reached", "", "whether the branch reaches a factor of 1", "s"),
 )
-#: Of what the limit is told of, where a table has it.
-AT_LIMIT = ("amplitude", "frequency_hz", "cycles")
+#: Of what else than the amplitude the limit is told, where a table has it.
+BESIDE = ("frequency_hz", "cycles")
 LEVEL = Column("limit_level", "1", "level of the force at which the largest factor over frequency is 1")
 
 Row = dict[str, Any]
@@ -34,10 +34,12 @@ def endurance(table: StressTable) -> tuple[list[Column], list[Row]]:
         return [], []
     known = {column.name: column for column in table.columns}
     parts = [name for name in PARTS if name in known]
-    at_limit = [known[name] for name in AT_LIMIT if name in known]
+    at_limit = [known[name] for name in told_at_limit(known)]
     columns = {name: table[name] for name in known}
     rows = [_row(columns, chosen, parts) for chosen in rows_of_branches(columns)]
-    found = [*(known[name] for name in parts), *_largest(known["amplitude"]), *map(_limited, at_limit)]
+    amplitude = _renamed(at_limit[0], "at", "of the largest factor")
+    found = [*(known[name] for name in parts), LARGEST, amplitude, *REACHED]
+    found += [_renamed(column, "limit", "where the factor is 1") for column in at_limit]
     if "level" in parts:
         level = _limit_level(rows)
         found.append(LEVEL)
@@ -45,31 +47,27 @@ def endurance(table: StressTable) -> tuple[list[Column], list[Row]]:
     return found, rows
 
 
-def _largest(amplitude: Column) -> Iterator[Column]:
-    for column in LARGEST:
-        yield (
-            Column(column.name, amplitude.unit, column.long_name, column.kind, amplitude.units)
-            if (column.name == "at_amplitude")
-            else column
-        )
+def told_at_limit(known: Container[str]) -> list[str]:
+    """Columns of which the limit is told: the amplitude first, of a whole wheel's response that of any sector."""
+    return [amplitude_column(known), *(name for name in BESIDE if name in known)]
 
 
-def _limited(column: Column) -> Column:
-    return Column(f"limit_{column.name}", column.unit, f"{column.long_name}, where the factor is 1", "f", column.units)
+def _renamed(column: Column, prefix: str, what: str) -> Column:
+    return Column(f"{prefix}_{column.name}", column.unit, f"{column.long_name}, {what}", "f", column.units)
 
 
 def _row(columns: Mapping[str, Array], chosen: Indices, parts: list[str]) -> Row:
     """Of one branch; the limit is where its factor first rises to 1."""
     factor = columns["goodman"][chosen]
     top = chosen[np.argmax(factor)]
-    names = [name for name in AT_LIMIT if name in columns]
+    names = told_at_limit(columns)
     passed = first_reaching(factor, 1.0, *(columns[name][chosen] for name in names))
     before = bool(factor[0] >= 1)
     values = (np.nan,) * len(names) if before or passed is None else passed
     return {
         **{name: columns[name][top].item() for name in parts},
         "largest_goodman": float(columns["goodman"][top]),
-        "at_amplitude": float(columns["amplitude"][top]),
+        f"at_{names[0]}": float(columns[names[0]][top]),
         "worst_node": int(columns["worst_node"][top]),
         "reached": BEFORE if before else NO if passed is None else YES,
         **{f"limit_{name}": value for name, value in zip(names, values)},

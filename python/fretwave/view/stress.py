@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import h5py
 
 #: Columns of the branch that lead a row, where it has them.
-LEAD = ("point", *PARTS, "cycles", "amplitude", "frequency_hz")
+LEAD = ("point", *PARTS, "cycles", "amplitude", "largest_amplitude", "frequency_hz")
 NODE = Column("worst_node", "1", "node of the largest Goodman factor, or of the largest stress amplitude", "i")
 SECTOR = Column("worst_sector", "1", "sector that it is in", "i")
 STRESS = (
