@@ -161,7 +161,7 @@ def test_petsc_s_help_lists_our_own_options_with_what_they_mean(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("command", [["view"], ["report"], ["probe", "--dof", "m1"], ["stress"]])
-@pytest.mark.parametrize("out", [".", "results.h5/out", "case.toml/a/b", "x" * 300])
+@pytest.mark.parametrize("out", [".", "results.h5/out", "case.toml/a/b", "missing/out", "x" * 300])
 def test_a_file_to_write_is_no_folder_and_lies_in_one(earlier: Path, monkeypatch, capfd, command, out) -> None:
     monkeypatch.chdir(earlier)
     assert main([command[0], ".", *command[1:], "--out", out]) == 2

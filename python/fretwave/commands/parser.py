@@ -70,9 +70,12 @@ def names(text: str) -> list[str]:
 
 
 def file_to_write(path: Path | None, example: str) -> Path | None:
-    """Where a file goes that the command line names; a folder is refused, and what lies in a file."""
+    """Where a file goes that the command line names; a folder is refused, and what lies in a file or in no folder."""
     if path is not None and is_there(path) and path.is_dir():
         raise InputError("this is a folder", "--out", display(path), "a file to write", f"--out {path / example}")
     if path is not None:
         expect_place(path, f"--out {example}")
+        if not is_there(path.parent):
+            what, where = "the file cannot be written: its folder is not there", display(path.parent)
+            raise InputError(what, "--out", where, "a folder that exists", f"`mkdir -p {where}`, or --out {example}")
     return path
