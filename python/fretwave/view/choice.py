@@ -30,7 +30,10 @@ if TYPE_CHECKING:
     import h5py
 
 #: Columns of the branch that go with a picture.
-SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
+SHOWN = (
+    *("point", "amplitude", "largest_amplitude", "cycles", "frequency_hz", "zeta", "level"),
+    *("stick", "slip", "open"),
+)
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,10 @@ class Choice:
         """Which points are shown, each in a line, and those whose contacts would be, but are not."""
         for row, (point, asked) in enumerate(zip(self.points, self.asked)):
             amplitude, frequency = self.states["amplitude"][row], self.states["frequency_hz"][row]
-            yield f"{self.name}: point {point}, amplitude {amplitude:.6g} {self.unit}, {frequency:.6g} Hz{asked}"
+            values = f"amplitude {amplitude:.6g} {self.unit}"
+            if "largest_amplitude" in self.states:
+                values += f" (largest of all sectors {self.states['largest_amplitude'][row]:.6g})"
+            yield f"{self.name}: point {point}, {values}, {frequency:.6g} Hz{asked}"
         if self.without and with_contacts:
             numbers = ", ".join(str(point) for point in self.without)
             yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"

@@ -12,6 +12,7 @@ from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..files.whole import replaced
 from ..plots import scales, solid, style
+from ..results.overview import amplitude_column, whose_amplitude
 from .motion import Scene
 from .skin import numbered, skin
 from .vtkhdf import Cells
@@ -125,9 +126,10 @@ class Still:
 
     def _title(self) -> str:
         choice = self.scene.choice
-        amplitude, hertz = choice.states["amplitude"][0], choice.states["frequency_hz"][0]
+        amplitude, hertz = choice.states[amplitude_column(choice.states)][0], choice.states["frequency_hz"][0]
         shown = scales.linear(choice.units, choice.unit, amplitude).text(float(amplitude))
-        return f"{choice.name}: amplitude {shown}, {hertz:.6g} Hz, drawn × {self.scale:g}"
+        of = whose_amplitude(choice.states)
+        return f"{choice.name}: amplitude{of} {shown}, {hertz:.6g} Hz, drawn × {self.scale:g}"
 
 
 def _wide(values: Array) -> tuple[float, float]:
