@@ -24,6 +24,7 @@ def build() -> Structure:
         return dof.reshape(-1, 3)[nodes_of_face[np.isin(nodes_of_face, wheel.free)]].ravel()
 
     M, K = (A.tocsr()[free][:, free] for A in wheel.matrices)
+    radial = 1e6 * wheel.matrices[0] @ (nodes * [1.0, 1.0, 0.0]).ravel()  # at 1000 rad/s
     ahead, behind = int(wheel.face("shroud", "high")[0]), int(wheel.face("shroud", "low")[0])
     return Structure(
         M=M,
@@ -38,4 +39,5 @@ def build() -> Structure:
         high=face("high"),
         axis="z",
         parts={"all": K},
+        loads={"spin": radial[free]},
     )

@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from command_line import call
 from models import gauged_sector
 from models.csv_columns import table
+from models.meshed_wheel import SECTORS
 
 from fretwave import open_run
 
@@ -106,3 +108,49 @@ def test_the_amplitude_of_a_driven_wheel_is_that_of_any_sector(tmp_path: Path, c
     assert gauges["largest_amplitude"][top] > 1.05 * gauges["amplitude"][top]
     assert limit["at_largest_amplitude"][1] == points["largest_amplitude"][top]
     assert f"at point {top}, amplitude {points['largest_amplitude'][top]:.5g} m of any sector" in printed
+    assert call("view", tmp_path / "run", "--analysis", "driven", "--point", top, "--png") == 0
+    printed = capfd.readouterr().out
+    assert f"(largest of all sectors {points['largest_amplitude'][top]:.6g})" in printed
+
+
+LOADED = """
+[reduction]
+modes = 4
+
+[preload]
+loads = ["spin"]
+pair_loads = false
+
+[damping]
+zeta = 0.002
+"""
+RESPONSE = """
+[[analysis]]
+name = "{name}"
+type = "forced"
+wheel = {wheel}
+engine_order = 1
+harmonics = 1
+samples = 60
+force = {{ tip = 1.0 }}
+observe = "tip"
+levels = [1.0]
+frequency = [2200.0, 2201.0]
+"""
+
+
+def test_a_driven_wheel_keeps_the_state_at_rest_that_it_moves_about(tmp_path: Path) -> None:
+    """Without it a view drew the static displacement as motion, and stress lacked what no component mode has of it."""
+    shutil.copy(gauged_sector.__file__, tmp_path / "gauged_sector.py")
+    text = CASE + LOADED + RESPONSE.format(name="sector", wheel="false") + RESPONSE.format(name="wheel", wheel="true")
+    (tmp_path / "case.toml").write_text(text)
+    assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    with h5py.File(tmp_path / "run" / "results.h5") as file:
+        one, all_of_them = (file[name]["rest_displacement"][()] for name in ("sector", "wheel"))
+    np.testing.assert_allclose(
+        all_of_them.reshape(SECTORS, -1), np.tile(one, (SECTORS, 1)), atol=1e-9 * np.abs(one).max()
+    )
+    assert call("stress", tmp_path / "run") == 0
+    sector, wheel = (table(tmp_path / "run" / f"{name}_gauges.csv") for name in ("sector", "wheel"))
+    for name in ("near_mean", "far_mean", "mean_stress", "near_strain", "stress_amplitude"):
+        np.testing.assert_allclose(wheel[name], sector[name], rtol=1e-7)

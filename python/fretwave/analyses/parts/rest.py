@@ -32,7 +32,7 @@ RIGID = 1e-6
 
 
 def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Rest]:
-    """Solve the preload of an analysis; the contact laws take it as their rest state. Collective.
+    """Solve the preload of an analysis; the contact laws take it as their rest state, the results keep it. Collective.
 
     Returns
     -------
@@ -44,7 +44,11 @@ def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Rest]:
     NotConverged
         There is no static equilibrium.
     """
-    return None if context.case.preload_of(context.analysis) is None else loaded_state(context)
+    if context.case.preload_of(context.analysis) is None:
+        return None
+    rest = loaded_state(context)
+    context.arrays["rest_displacement"] = rest.displacement
+    return rest
 
 
 def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0) -> Rest:
@@ -139,7 +143,6 @@ def start_mode(context: AnalysisContext[AnalysisSection], linear_mode: int) -> t
             f"{context.name}: at rest {100 * rest.stick:.3g} % of the pairs stick, {100 * rest.slip:.3g} % slip,"
             f" {100 * rest.open:.3g} % are open"
         )
-        context.arrays["rest_displacement"] = rest.displacement
     modes = stuck_or_no_modes(context, linear_mode)
     if not modes:
         context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")

@@ -79,8 +79,6 @@ def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
         context = context.of(_family(context, mode))
     tuned, asymptotes = _tuned(context)
     analysis = context.analysis
-    if rest is not None:
-        context.arrays["rest_displacement"] = rest.displacement
     if mistuned:
         mode, avoid = mode or _most_alike(context, tuned), None
         asymptotes = _free(context, mode)
