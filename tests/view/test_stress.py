@@ -222,6 +222,15 @@ def test_tables_may_be_added_after_the_run(tmp_path: Path, capfd) -> None:
     assert call("resume", run, "--no-plots", "-q") == 0  # no result depends on them
 
 
+def test_limits_that_are_taken_out_leave_no_table_of_before(tmp_path: Path) -> None:
+    """The report would show them beside the new table of the gauges."""
+    folder = solved(tmp_path, CASE + MATERIAL + MODE.replace("40.0", "0.2"))
+    assert call("stress", folder) == 0 and (folder / "mode_goodman.csv").exists()
+    (tmp_path / "case.toml").write_text(CASE + MATERIAL.partition("endurance_limit")[0] + MODE.replace("40.0", "0.2"))
+    assert call("stress", folder) == 0
+    assert (folder / "mode_gauges.csv").exists() and not (folder / "mode_goodman.csv").exists()
+
+
 def test_check_and_report_tell_of_gauges(run: Path, capfd) -> None:
     capfd.readouterr()
     assert call("check", run.parent / "case.toml", "--no-solve") == 0

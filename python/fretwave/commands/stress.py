@@ -40,9 +40,17 @@ def stress(folder: Path, asked: str | None = None, out: Path | None = None) -> N
         replace_text(path, table_text(table.columns, table.rows))
         print(f"{table.name}: {counted(len(table.rows), 'point')}, {display(path)}")
         print("\n".join(f"  {line}" for line in lines(table)))
-        columns, rows = endurance(table)
-        if rows and out is None:
-            replace_text(folder / f"{table.name}_{LIMITS}.csv", table_text(columns, rows))
+        if out is None:
+            _write_limits(folder / f"{table.name}_{LIMITS}.csv", table)
+
+
+def _write_limits(path: Path, table: StressTable) -> None:
+    """A table of limits that the case no longer gives would be shown beside the new one of the gauges."""
+    columns, rows = endurance(table)
+    if rows:
+        replace_text(path, table_text(columns, rows))
+    else:
+        path.unlink(missing_ok=True)
 
 
 def lines(table: StressTable) -> Iterator[str]:
