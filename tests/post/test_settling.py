@@ -70,6 +70,24 @@ def test_a_motion_settles_when_less_than_the_tolerance_is_to_come(start, size):
     assert abs(amplitude[settled - 12] - 1.0) > 1e-4, "no later than needed"
 
 
+@pytest.mark.parametrize("cycles", [3.3, 17.0, 28.0, 60.0, 110.0])
+@pytest.mark.parametrize("size, text", [(4e-7, LIMIT_CYCLE), (1e-4, LIMIT_CYCLE), (4e-3, NOT_SETTLED)])
+def test_a_swing_that_does_not_grow_is_judged_by_its_size(cycles, size, text):
+    """Of a motion at its cycle whose 64 samples drift along the period: 4e-7, over 28 cycles."""
+    phases = np.arange(0.0, 2.0 * np.pi, 0.2)
+    wave = size * np.sin(2.0 * np.pi * np.arange(400) / cycles + phases[:, None])
+    assert [end_of(van_der_pol(0.8, 0.1, 400) * np.exp(one)).text for one in wave] == [text] * len(wave)
+
+
+@pytest.mark.parametrize("rate", [0.005, 0.01, 0.03, 0.1, 0.3])
+@pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3])
+def test_a_motion_that_leaves_an_unstable_cycle_has_not_settled(rate, size):
+    """log a = d e^(rate n), grown to `size`, after it came there from elsewhere."""
+    grown = size * np.exp(rate * np.arange(-399, 1))
+    assert end_of(np.exp(grown)).text != LIMIT_CYCLE
+    assert end_of(np.exp(grown + 0.3 * np.exp(-0.2 * np.arange(400)))).text == NOT_SETTLED
+
+
 @pytest.mark.parametrize("start", [0.5, 0.9, 1.2])
 def test_a_slow_van_der_pol_oscillator_far_from_its_cycle_has_not_settled(start):
     """The last ten cycles agree to 1e-3, the cycle is 10 % to 50 % away."""

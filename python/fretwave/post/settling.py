@@ -74,16 +74,18 @@ def _lengths(level: Array) -> set[int]:
 def _to_come(level: Array, length: int) -> float:
     """Change of the level still to come, by Aitken's extrapolation over the means of the last three parts.
 
-    Changes within the scatter of the last part are noise, and nothing is to come; else the scatter counts against the
-    motion. Infinite where the changes do not become smaller.
+    Changes within the scatter of the last part are noise, and no more than that is to come; else the scatter counts
+    against the motion. Changes within the scatter of what came before are part of a swing, as of cycles whose samples
+    drift along their period: it goes no further. Infinite where the changes do not become smaller and are neither.
     """
     parts = level[-PARTS * length :].reshape(PARTS, length)
     before, last = np.abs(np.diff(parts.mean(axis=1)))
-    scatter = _scatter(parts[-1])
+    scatter, swing = _scatter(parts[-1]), _scatter(level[len(level) // 2 : -length])
     if last <= scatter:
-        return 0.0
+        return scatter
     left = before - last - 2.0 * scatter
-    return float(last * (last + scatter) / left) if left > 0.0 else np.inf
+    further = float(last * (last + scatter) / left) if left > 0.0 else np.inf
+    return min(further, swing) if last <= swing else further
 
 
 def _scatter(level: Array) -> float:
