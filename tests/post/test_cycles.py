@@ -124,6 +124,22 @@ def test_zero_of_the_damping_is_found_and_stable_where_damping_grows():
     assert crossing.stable
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_met_at_a_point_is_met_once(seed):
+    """Rounding had two cycles at one, or two sheets at an amplitude of the table and none at its ends."""
+    draw = np.random.default_rng(seed)
+    amplitude = np.sort(10.0 ** draw.uniform(-2.0, 0.0, 9))
+    amplitude[4] = amplitude[3] * (1.0 + 1e-6) if seed % 2 else amplitude[4]
+    zeta, omega = np.sort(draw.uniform(-0.02, 0.02, 9)), draw.uniform(24.0, 26.0, 9)
+    curve = ModeCurve(amplitude, omega, omega, zeta - zeta[4])
+    (crossing,) = curve.crossings()
+    assert crossing.amplitude == pytest.approx(amplitude[4], rel=ROUNDING)
+    values = [curve.at(one) for one in amplitude]
+    assert [value.sheets for value in values] == [1] * len(amplitude)
+    assert [value.omega for value in values] == pytest.approx(omega, rel=ROUNDING)
+    assert [len(curve.amplitudes_at(one)) for one in zeta - zeta[4]] == [1] * len(zeta)
+
+
 def linear_response(zeta=0.02, omega0=25.0, count=401):
     top = omega0 * np.sqrt(1.0 - 2.0 * zeta**2)
     omega = np.sort(np.append(np.linspace(20.0, 30.0, count - 1), top))  # with its peak, as a branch has it

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Optional
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
 from .largest import largest
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 #: weights of (log amplitude, relative frequency, damping ratio) in the length along the curve: all of order one
 LENGTH_WEIGHTS = (1.0, 10.0, 20.0)
@@ -60,6 +63,11 @@ def forward(amplitude: Array, point: int) -> Optional[bool]:
     around = np.concatenate([moves[moves < point][-1:], moves[moves >= point][:1]])
     return bool((steps[around] * steps[moves[0]] > 0).all()) if len(moves) else None
 
+
+#: A value this close to a point's own, relative or from zero, is met there.
+AT_A_POINT = 1e-13
+#: Places of a curve this close to each other are one, in its length.
+ONE_PLACE = 1e-7
 
 #: Relative length of the curve of a branch of one point.
 SHORTEST = 1e-12
@@ -135,8 +143,7 @@ class ModeCurve:
 
     def all_at(self, amplitude: float) -> list[ModeValue]:
         """Every solution at an amplitude, in the order of the branch."""
-        roots = np.unique(self._log_amplitude.solve(np.log(amplitude), discontinuity=False, extrapolate=False))
-        points = self._curve(roots[np.isfinite(roots)])
+        points = self._curve(_places(self._log_amplitude, np.log(amplitude)))
         return [ModeValue(amplitude, float(p[1]), float(p[2]), float(p[3]), len(points)) for p in points]
 
     def at(self, amplitude: float, falling: bool = True) -> ModeValue:
@@ -148,13 +155,11 @@ class ModeCurve:
 
     def amplitudes_at(self, zeta: float) -> list[float]:
         """Amplitudes at which the mode has a damping ratio."""
-        roots = np.unique(self._zeta.solve(zeta, discontinuity=False, extrapolate=False))
-        return [float(a) for a in np.exp(self._log_amplitude(roots[np.isfinite(roots)]))]
+        return [float(a) for a in np.exp(self._log_amplitude(_places(self._zeta, zeta)))]
 
     def crossings(self) -> list[Crossing]:
         """Zeros of the damping ratio in the order of the branch, not where it stays zero."""
-        roots = np.unique(self._zeta.roots(discontinuity=False, extrapolate=False))
-        return [self._crossing(s) for s in roots[np.isfinite(roots)] if self._changes_sign(s)]
+        return [self._crossing(s) for s in _places(self._zeta, 0.0) if self._changes_sign(s)]
 
     def _changes_sign(self, length: float) -> bool:
         """Damped on one side and fed on the other; at an end of the branch, one of both."""
@@ -183,6 +188,17 @@ class ModeCurve:
         steps = np.diff(self._log_amplitude(self._log_amplitude.x))
         moves = steps[np.abs(steps) > NO_STEP]
         return len(moves) > 0 and bool(self._log_amplitude(length, 1) * moves[0] > 0.0)
+
+
+def _places(curve: PchipInterpolator, value: float) -> Array:
+    """Lengths at which a curve has a value, in order and each once.
+
+    At one of its points the pieces on both sides have a root, or by rounding neither has.
+    """
+    roots = np.unique(curve.solve(value, discontinuity=False, extrapolate=False))
+    met = curve.x[np.abs(curve(curve.x) - value) <= AT_A_POINT * max(1.0, abs(value))]
+    apart = np.abs(np.subtract.outer(roots, met)).min(axis=1, initial=np.inf) > ONE_PLACE * curve.x[-1]
+    return np.sort(np.concatenate([roots[np.isfinite(roots) & apart], met]))
 
 
 def _length(values: Array) -> Array:
