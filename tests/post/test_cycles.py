@@ -42,6 +42,28 @@ def test_decaying_cosine_gives_its_own_amplitude_frequency_and_damping(zeta):
     assert np.allclose(cycles.zeta, zeta, rtol=0.0, atol=INTERPOLATION)
 
 
+@pytest.mark.parametrize("zeta", [0.02, 1e-4, -0.02])
+@pytest.mark.parametrize("mean", [0.3, -0.999, 40.0])
+@pytest.mark.parametrize("guess", [0.9, 1.0, 1.1])
+def test_a_cosine_that_decays_about_another_place_gives_the_same(zeta, mean, guess):
+    """Its crossings of zero end while it still swings, and before that they drift."""
+    t, x, v, beta, omega = decaying(zeta)
+    cycles = extract(t, x + mean, v, guess * 2.0 * np.pi / omega)
+    assert len(cycles) >= 18
+    assert np.allclose(cycles.omega, omega, rtol=INTERPOLATION * max(1.0, abs(mean)))
+    assert np.allclose(cycles.zeta, zeta, rtol=0, atol=4.0 * zeta**2 * 1e-2 + 1e-6 * max(1.0, abs(mean)))
+    assert np.allclose(cycles.amplitude, np.exp(-beta * cycles.time), rtol=3.0 * zeta**2 + 1e-5)
+
+
+def test_a_mean_that_fades_with_the_motion_leaves_its_amplitude():
+    """As where a contact opens at rest: x = e^(-beta t) (cos(omega t) + 0.5)."""
+    t, x, v, beta, omega = decaying(0.02)
+    mean = 0.5 * np.exp(-beta * t)
+    cycles = extract(t, x + mean, v - beta * mean, 2.0 * np.pi / omega)
+    assert np.allclose(cycles.amplitude, np.exp(-beta * cycles.time), rtol=3.0 * 0.02**2)
+    assert np.allclose(cycles.zeta[2:-2], 0.02, rtol=1e-3)  # the mean's slope is one-sided at both ends
+
+
 def test_third_harmonic_does_not_enter_the_amplitude_of_a_steady_motion():
     t = np.linspace(0.0, 10.0, 10 * SAMPLES + 1)
     turn = 2.0 * np.pi * t

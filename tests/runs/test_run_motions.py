@@ -86,6 +86,54 @@ def test_a_decay_without_a_full_cycle_is_told_in_words(tmp_path: Path, capfd) ->
     assert any(line.startswith("0 full cycles, none that changes slowly") for line in said)
 
 
+#: A stop that presses with 1 N before the structure has given way; about its place of rest all is linear.
+PRESSED = """
+[model]
+dofs = ["m1", "m2"]
+M = [[1.0, 0.0], [0.0, 0.5]]
+K = [[3.0, -1.0], [-1.0, 1.5]]
+C = [[{c}, 0.0], [0.0, 0.01]]
+[[contact]]
+law = "unilateral_spring"
+pairs = ["m2"]
+normal_stiffness = 1.0
+gap = -1.0
+[[analysis]]
+name = "mode"
+type = "mode"
+harmonics = 5
+samples = 128
+normalise = "m2"
+amplitude = [0.005, 0.3]
+[[analysis]]
+name = "motion"
+type = "{kind}"
+mode = "mode"
+amplitude = [0.03]
+periods = 30
+"""
+
+
+@pytest.mark.parametrize("c", [0.03, -0.03])
+def test_a_motion_about_a_pressed_stop_has_the_cycles_of_its_linear_mode(tmp_path: Path, capfd, c: float) -> None:
+    """m2 swings by 0.03 m about -0.46 m and never passes zero: there was no cycle."""
+    path = tmp_path / "case.toml"
+    path.write_text(PRESSED.format(c=c, kind="free_decay"))
+    assert call("run", path, "--no-plots", "--out", tmp_path / "run") == 0
+    assert "nothing to compare" not in capfd.readouterr().out
+    with open(tmp_path / "run" / "motion.csv", newline="") as file:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    inverse = np.diag([1.0, 2.0])
+    K, C = np.array([[3.0, -1.0], [-1.0, 2.5]]), np.diag([c, 0.01])
+    values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]]))
+    s = complex(min(values[values.imag > 0], key=abs))
+    assert len(rows) >= 28
+    assert [row["omega"] for row in rows] == pytest.approx([s.imag] * len(rows), rel=1e-5)
+    assert [row["zeta"] for row in rows] == pytest.approx([-s.real / abs(s)] * len(rows), rel=1e-2)
+    exact = [0.03 * np.exp(s.real * row["time"]) for row in rows]
+    assert [row["amplitude"] for row in rows] == pytest.approx(exact, rel=1e-4)
+
+
 # Towards limit cycles
 
 FED = -1.0119288512538815  # -2 % of m1 alone

@@ -29,7 +29,7 @@ class Cycles:
     ----------
     time : (n,) middle of the cycle [s]
     amplitude : (n,) fundamental amplitude at that time, unit of the signal
-    omega : (n,) damped angular frequency, 2 pi over the time between upward zero crossings [rad/s]
+    omega : (n,) damped angular frequency, 2 pi over the time between upward crossings of zero or the mean [rad/s]
     zeta : (n,) damping ratio from the logarithmic decrement over the neighbouring cycles
     """
 
@@ -42,17 +42,22 @@ class Cycles:
         return len(self.time)
 
 
-def extract(t: Array, x: Array, v: Array) -> Cycles:
+def extract(t: Array, x: Array, v: Array, period: float = 0.0) -> Cycles:
     """Cycle by cycle values of a signal `x` with its velocity `v`, sampled at times `t`.
 
     The amplitude is that of the fundamental: x e^{beta (t - t_mid)} is projected on the cycle's own
-    frequency, which is exact for a e^{-beta t} cos(omega t) and comparable with a modal amplitude.
+    frequency, which is exact for m + a e^{-beta t} cos(omega t) and comparable with a modal amplitude.
+
+    Parameters
+    ----------
+    period : of a signal that need not swing about zero [s], roughly: cycles then begin where it passes its mean over
+        such a time upwards
     """
     none = Cycles(*(np.empty(0) for _ in range(4)))
     if len(t) < 2 or not np.all(np.isfinite([x, v])):
         return none
     signal = interpolated(t, x, v)
-    bounds = upward_crossings(signal)
+    bounds = upward_crossings(_about_its_mean(signal, period) if period else signal)
     if len(bounds) < 5:
         return none
     middle = 0.5 * (bounds[1:] + bounds[:-1])
@@ -104,11 +109,29 @@ def peaks(t: Array, x: Array, v: Array) -> tuple[Array, Array]:
     return times, np.asarray(signal(times), dtype=float)
 
 
+def _about_its_mean(signal: CubicHermiteSpline, period: float) -> CubicHermiteSpline:
+    """A signal less its mean over a period around each of its samples; a e^{-beta t} cos(omega t) remains of this form.
+
+    Without the half periods at both ends.
+    """
+    t, half, whole = signal.x, 0.5 * period, signal.antiderivative()
+    t = t[(t >= t[0] + half) & (t <= t[-1] - half)]
+    if len(t) < 2:
+        return signal
+    mean, rate = ((f(t + half) - f(t - half)) / period for f in (whole, signal))
+    return interpolated(t, signal(t) - mean, signal(t, 1) - rate)
+
+
 def _fundamental(signal: CubicHermiteSpline, bounds: Array, beta: Array) -> Array:
+    """Of each cycle, less its mean m(t), linear by those of the cycles around, which grows to m(t) e^{beta t} here."""
     phase = np.arange(PROJECTION_SAMPLES) / PROJECTION_SAMPLES
     length = np.diff(bounds)[:, None]
-    times = bounds[:-1, None] + phase * length
-    steady = signal(times) * np.exp(beta[:, None] * (phase - 0.5) * length)
+    time = (phase - 0.5) * length
+    grown = np.exp(beta[:, None] * time)
+    steady = signal(bounds[:-1, None] + phase * length) * grown
+    mean = steady.sum(axis=1) / grown.sum(axis=1)
+    rate = np.gradient(mean, 0.5 * (bounds[1:] + bounds[:-1]), edge_order=2)
+    steady -= (mean[:, None] + rate[:, None] * time) * grown
     return np.asarray(np.abs(steady @ np.exp(-2j * np.pi * phase)) * 2.0 / PROJECTION_SAMPLES, dtype=float)
 
 

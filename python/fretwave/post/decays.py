@@ -44,21 +44,28 @@ def mode_state(
 ) -> tuple[Array, float, float]:
     """Harmonic coefficients (n_dof, m), beta and omega of the motion at an amplitude of a finished branch.
 
-    CNM motions decay; EPMC motions are periodic with omega0, so beta is 0 there. Linear in log a between the two
-    neighbouring points of the last sheet, the one a decay from above meets; the fundamental of the normalised dof
-    is exact.
+    CNM motions decay; EPMC motions are periodic with omega0, so beta is 0 there. Between the two neighbouring points
+    of the last sheet, the one a decay from above meets, beta and omega are linear in log a, the coefficients in a: a
+    place of rest that the motion swings about and what grows with it are exact, as is the fundamental of the
+    normalised dof.
     """
     level, wanted = np.log(table["amplitude"]), np.log(at_the_end(table["amplitude"], amplitude))
     between = np.flatnonzero((level[:-1] - wanted) * (level[1:] - wanted) <= 0.0)
     if not len(between):
         raise _outside(amplitude, table["amplitude"])
     pair = [int(between[-1]), int(between[-1]) + 1]
-    weights = np.interp(wanted, *np.array(sorted(zip(level[pair], [0.0, 1.0]))).T) * np.array([-1.0, 1.0]) + [1.0, 0.0]
-    scaled = coefficients[pair] / table["amplitude"][pair, None, None]
+    weights = _weights(level[pair], wanted)
+    shares = _weights(table["amplitude"][pair], np.exp(wanted))
     decays = method == "CNM"
     beta = float(weights @ table["beta"][pair]) if decays else 0.0
     omega = float(weights @ table["omega" if decays else "omega0"][pair])
-    return amplitude * np.tensordot(weights, scaled, axes=1), beta, omega
+    return np.tensordot(shares, coefficients[pair], axes=1), beta, omega
+
+
+def _weights(ends: Array, wanted: float) -> Array:
+    """Of two values, for what is linear between them."""
+    behind = np.interp(wanted, *np.array(sorted(zip(ends, [0.0, 1.0]))).T)
+    return np.array([1.0 - behind, behind])
 
 
 def _outside(amplitude: float, branch: Array) -> InputError:

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 #: Periods from the middle of the last cycle to the end of a motion that no longer swings; one and a half at most else.
 QUIET = 3.0
+#: Label of the mean in a mode's coefficients.
+MEAN = "0"
+#: A mean above this, in amplitudes, is no rounding.
+ASIDE = 1e-9
 #: Bounds of a motion, in largest coefficients of the mode's motions: of one that grows ever faster, and of any.
 BEYOND, FAR = 2.0, 1e4
 
@@ -39,11 +43,13 @@ class Followed:
     Attributes
     ----------
     floor : amplitude below which they are noise; 0 where none is
+    about : in words, where cycles pass
     """
 
     motion: Motion
     cycles: Cycles
     floor: float
+    about: str = " about zero"
 
     def end(self, unit: str) -> list[str]:
         """In words, where its cycles end before the motion does."""
@@ -56,7 +62,7 @@ class Followed:
         if not count:
             return ["fewer than four full cycles"]
         quiet = self.motion.t[-1] - self.cycles.time[-1] > QUIET * 2.0 * np.pi / self.cycles.omega[-1]
-        return [f"ends after {counted(count, 'cycle')}: it no longer swings about zero"] if quiet else []
+        return [f"ends after {counted(count, 'cycle')}: it no longer swings{self.about}"] if quiet else []
 
 
 class Starts:
@@ -72,11 +78,20 @@ class Starts:
         self.labels, self.coefficients = context.coefficients(self.mode.name)
         given, case = self.mode.normalise, context.case
         self.seen = case.dof(given) if isinstance(given, str) else row_on(case, given)
+        #: The mode swings about another place than zero.
+        self.aside = self._has_a_mean()
         self._model = ExitStack()
         model = self._model.enter_context(integrated_model(context))
         self.integrator = Transient(model, prefix=context.prefix)
         self.writer = context.writer(columns, normalise=label_of(self.mode.normalise))
         self.stopped: list[str] = []
+
+    def _has_a_mean(self) -> bool:
+        if MEAN not in self.labels:
+            return False
+        mean = self.coefficients[:, :, self.labels.index(MEAN)]
+        seen = mean[:, self.seen] if isinstance(self.seen, int) else mean @ self.seen
+        return bool((np.abs(seen) > ASIDE * self.table["amplitude"]).any())
 
     def __enter__(self) -> Starts:
         return self
@@ -117,11 +132,12 @@ class Starts:
         count = section.periods * section.samples_per_period
         most = section.periods * STEPS_PER_PERIOD
         motion = free_motion(self.integrator, state, self.seen, step, count, section.tolerance, limit, most)
-        cycles = extract(motion.t, motion.x, motion.v)
+        cycles = extract(motion.t, motion.x, motion.v, 2.0 * np.pi / omega if self.aside else 0.0)
         size = max(float(np.abs(state[0]).max()), float(np.abs(state[1]).max()) / omega)
         floor = noise_floor(cycles, section.tolerance, size)
         kept = above_noise(cycles, floor)
-        return Followed(motion, kept, float(floor[len(kept)]) if len(kept) < len(cycles) else 0.0)
+        about = " about its mean" if self.aside else " about zero"
+        return Followed(motion, kept, float(floor[len(kept)]) if len(kept) < len(cycles) else 0.0, about)
 
     def _start(self, number: int, amplitude: float) -> tuple[Array, float, float]:
         """Harmonic coefficients (n_dof, m), beta and omega of the mode's motion."""
