@@ -63,3 +63,19 @@ def test_a_branch_that_comes_back_is_judged_where_its_amplitude_is_largest(zeta,
     event = np.array(["", "zero_damping" if min(zeta) < 0 < max(zeta) else "", "fold", ""])
     (wave,) = describe_waves({**columns, "frequency_hz": np.full(4, 10.0), "event": event}, [1])
     assert wave["last_amplitude"] == 3.0 and said in words(wave, "m")
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(
+    ("zeta", "said"),
+    [
+        ([-0.01, -0.001, 0.001], "limit cycle not located; largest"),
+        ([-0.01, 0.001, -0.01], "limit cycle not located, growth without bound beyond; largest"),
+        ([0.01, 0.001, -0.01], "decays below, limit cycle not located; largest"),
+    ],
+)
+def test_a_change_of_sign_without_a_point_at_zero_leaves_no_hole_in_the_words(zeta, said):
+    """They were ": , growth without bound beyond"."""
+    columns = {"nodal_diameter": np.ones(3), "amplitude": np.array([1.0, 2.0, 3.0]), "zeta": np.array(zeta)}
+    (wave,) = describe_waves({**columns, "frequency_hz": np.full(3, 10.0), "event": np.full(3, "")}, [1])
+    assert said in words(wave, "m")

@@ -11,6 +11,9 @@ import numpy.typing as npt
 from .limit_cycles import limit_cycles, stability
 from .mode_curve import NO_DAMPING, most_damped, without_rounding
 
+#: Of a wave whose damping changes its sign, but at no point: the corrector failed there, or the two zeros beside a peak
+#: are nearer to each other than the branch's own cubic tells.
+NOT_LOCATED = "limit cycle not located"
 STABLE = {True: "stable", False: "unstable", None: "unknown"}
 
 
@@ -88,7 +91,7 @@ def verdict(zeta: npt.ArrayLike, top: int = -1) -> str:
 
 def words(wave: Mapping[str, Any], unit: str) -> str:
     """A wave's fate in one line; `unit` of its amplitudes."""
-    cycles = "; ".join(_cycle(cycle, unit) for cycle in wave["limit_cycles"])
+    cycles = "; ".join(_cycle(cycle, unit) for cycle in wave["limit_cycles"]) or NOT_LOCATED
     peak = f"largest damping {100 * wave['largest_zeta']:+.3g} % at a = {wave['at_amplitude']:.3g} {unit}"
     last = f"{wave['last_amplitude']:.3g} {unit}"
     fate = {
