@@ -35,7 +35,7 @@ class Transient {
   Transient(model::Model const&, std::vector<Excitation> excitation, double omega, std::string const& prefix);
   Transient(Transient const&) = delete;
   /// From (x0, v0) to t_end, sampled every dt_out by the method's own interpolation; stops early when |x|
-  /// exceeds `limit`, or when more than `most_steps` steps would be needed. Collective.
+  /// exceeds `limit`, with that state, or when more than `most_steps` steps would be needed. Collective.
   History run(Vec x0, Vec v0, double t_end, double dt_out, double tolerance, double limit, double most_steps);
 
  private:
@@ -55,6 +55,7 @@ class Transient {
   static PetscErrorCode residual(TS, PetscReal, Vec, Vec, Vec, void*);
   static PetscErrorCode jacobian(TS, PetscReal, Vec, Vec, PetscReal, Mat, Mat, void*);
   static PetscErrorCode after_step(TS);
+  static PetscErrorCode expect_numbers(TS, PetscReal, Vec state, PetscBool* accept);
   History integrate(Vec x0, Vec v0, double tolerance, bool implicit);
   Sizes sizes(Vec state);
   double rate(Vec shape);
@@ -70,6 +71,7 @@ class Transient {
   void assemble(double shift, Mat A);
   void assemble_contact(size_t number, Mat A);
   void add_tangent(size_t number, Vec x, Vec out);
+  double largest(Vec state);
   void record(TS);
   void watch(TS);
   void sample(double t, Vec state);

@@ -15,6 +15,7 @@ from models.core_models import (
     single_dof,
     solve_at,
 )
+from scipy.integrate import quad
 from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
@@ -170,6 +171,23 @@ def test_limit_stops_a_growing_motion(comm):
     assert not run["finished"]
     assert np.abs(run["x"][-1]).max() > 10.0 >= np.abs(run["x"][:-1]).max()
     assert run["t"][-1] == pytest.approx(np.log(10) / 0.05, abs=2 * np.pi)
+
+
+@SERIAL
+@pytest.mark.parametrize("limit", [10.0, 1e4, 1e12, np.inf])
+@pytest.mark.parametrize("dt_out", [0.1, 1e-3])
+def test_a_motion_to_infinity_in_finite_time_ends_there(comm, limit, dt_out):
+    """x'' + x - x^3 = 0 from x = 1, v0 = 0.05: v^2 = v0^2 + (x^2 - 1)^2 / 2, so that t is the integral of dx / v."""
+    v0 = 0.05
+    law = fw.Contact(CubicLaw(-1.0), [[1.0]])
+    run = fw.Transient(fw.Model([[1.0]], [[1.0]], None, [law], comm)).run([1.0], [v0], 20.0, dt_out, 1e-9, limit)
+    inverse = lambda s: 1 / np.sqrt(v0**2 * s**4 + (1 - s**2) ** 2 / 2)  # noqa: E731
+    reached = np.abs(run["x"]).max()
+    way = quad(inverse, 1 / reached, 1.0, points=[0.9], limit=200)[0]
+    assert not run["finished"] and np.all(np.isfinite(run["x"]))
+    assert run["t"][np.argmax(np.abs(run["x"]))] == pytest.approx(way, rel=1e-6)
+    if np.isfinite(limit):
+        assert run["reason"] == "limit" and reached > limit
 
 
 @SERIAL
