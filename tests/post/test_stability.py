@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tolerances import SOLVED
 
-from fretwave.post.limit_cycles import limit_cycles, stability
+from fretwave.post.limit_cycles import limit_cycles, place, stability
 from fretwave.post.mode_curve import ModeCurve
 
 pytestmark = pytest.mark.ranks(1)
@@ -44,7 +45,10 @@ def test_a_branch_that_runs_back_says_nothing_of_stability_there(backwards):
 
 @pytest.mark.parametrize("folds", ([2.55590711], [3.72727819]))
 def test_a_cycle_at_a_fold_is_of_unknown_stability(folds):
-    assert both(branch(folds))[0] == [None]
+    table = branch(folds)
+    assert both(table)[0] == [None]
+    errors = dict.fromkeys(("zeta_error", "omega_error"), np.full(len(table["zeta"]), 1e-5))
+    assert limit_cycles({**table, **errors})[0]["amplitude_error"] is None
 
 
 @pytest.mark.parametrize("backwards", (False, True))
@@ -56,6 +60,21 @@ def test_a_cycle_at_an_end_of_a_branch_is_one(backwards):
     (cycle,) = limit_cycles(table)
     assert cycle["amplitude"] == pytest.approx(np.exp(6.0 + 1.2 * np.sin(6.0)), rel=1e-14)
     assert stability(cycle) == "stability unknown (branch end)"
+
+
+@pytest.mark.parametrize("end", (False, True))
+def test_the_error_of_damping_moves_a_cycle_along_the_branch(end):
+    """zeta = 1e-3 (a^2 - 4), f = 10 - a^2: slopes 4e-3 and -4 at a = 2, exact of parabolas through three points."""
+    a = np.array([1.5, 1.9, 2.0, 2.2, 2.9])[: 3 if end else 5]
+    table = {"amplitude": a, "zeta": 1e-3 * (a**2 - 4), "frequency_hz": 10 - a**2, "zeta_error": np.full(len(a), 1e-5)}
+    table |= {"event": np.where(a == 2, "zero_damping", ""), "omega_error": np.full(len(a), 0.02 * np.pi)}
+    (cycle,) = limit_cycles(table)
+    rel = 0.1 if end else SOLVED  # one side alone has the slope of a chord
+    assert cycle["amplitude_error"] == pytest.approx(1e-5 / 4e-3, rel=rel)
+    assert cycle["frequency_hz_error"] == pytest.approx(0.01 + 4 * 1e-5 / 4e-3, rel=rel)
+    assert place(cycle, "m").startswith("a = 2 +- 0.00") and place(cycle, "m").endswith("m, 6 +- 0.02 Hz")
+    (unknown,) = limit_cycles({**table, "zeta_error": np.full(len(a), np.nan)})
+    assert unknown["amplitude_error"] is None and place(unknown, "m") == "a = 2 m, 6 Hz"
 
 
 def test_a_start_that_sticks_undamped_is_no_cycle():

@@ -253,5 +253,7 @@ def _write(
     names = [name for name in waves[0] if name != "limit_cycles"] if waves else []
     context.write_table("waves", {name: [wave[name] for wave in waves] for name in names})
     plain = [{**cycle, "stable": STABLE[cycle["stable"]]} for cycle in cycles]
-    names = ["nodal_diameter", "amplitude", "frequency_hz", "stable", "point"]
+    for cycle in plain:
+        cycle["amplitude_error"] = math.nan if cycle["amplitude_error"] is None else cycle["amplitude_error"]
+    names = ["nodal_diameter", "amplitude", "amplitude_error", "frequency_hz", "stable", "point"]
     context.write_table("crossings", {name: [cycle[name] for cycle in plain] for name in names})

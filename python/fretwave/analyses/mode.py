@@ -17,7 +17,7 @@ from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of,
 from ..columns import ENERGY, MODE
 from ..errors import InputError
 from ..model.python_law import PythonLaw
-from ..post.limit_cycles import limit_cycles, stability
+from ..post.limit_cycles import limit_cycles, place, stability
 from ..post.mode_curve import most_damped, varies, without_rounding
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
@@ -279,7 +279,4 @@ def summarise(name: str, table: Mapping[str, Any], cycles: Sequence[Mapping[str,
         f" {counted(folds, 'fold')},"
         f"{largest_error('zeta', 100 * table['zeta_error'], '%')} {table['wall_s'].sum():.2f} s"
     ]
-    for cycle in cycles:
-        place = f"a = {cycle['amplitude']:.5g} {unit}, {cycle['frequency_hz']:.5g} Hz"
-        lines.append(f"{name}: limit cycle at {place}: {stability(cycle)}")
-    return lines
+    return lines + [f"{name}: limit cycle at {place(cycle, unit)}: {stability(cycle)}" for cycle in cycles]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .limit_cycles import limit_cycles, stability
+from .limit_cycles import limit_cycles, place, stability
 from .mode_curve import NO_DAMPING, most_damped, without_rounding
 
 #: Of a wave whose damping changes its sign, but at no point: the corrector failed there, or the two zeros beside a peak
@@ -113,9 +113,8 @@ def with_sign(diameters: int) -> str:
 
 
 def _cycle(cycle: Mapping[str, Any], unit: str) -> str:
-    place = f"a = {cycle['amplitude']:.4g} {unit}, {cycle['frequency_hz']:.5g} Hz"
     known = stability(cycle)
     if cycle["folds"]:
         low, high = cycle["folds"]
         known = known.replace("runs back there", f"runs back between {low:.5g} and {high:.5g} {unit}")
-    return f"limit cycle at {place}: {known}"
+    return f"limit cycle at {place(cycle, unit)}: {known}"

@@ -16,6 +16,9 @@ from .mode_curve import NO_DAMPING, forward
 STUCK = "stuck"
 #: Of a limit cycle, by what is known of it.
 SHORT = {True: "stable in its own amplitude", False: "unstable", None: "stability unknown"}
+OF_A_CYCLE = ("zeta", "frequency_hz")
+#: Points of a branch whose amplitudes differ relatively by less are one.
+ONE_POINT = 1e-6
 #: Of another mode's values, about half of the last digit that they are told with.
 TOLD = {"frequency_hz": 5e-4, "zeta": 5e-3}
 
@@ -38,9 +41,39 @@ def limit_cycles(table: Mapping[str, Any]) -> list[dict[str, Any]]:
             "frequency_hz": float(table["frequency_hz"][point]),
             "runs_back": forward(amplitude, int(point)) is False,
             "stable": _stable(amplitude, zeta, int(point)),
+            **_errors(table, int(point)),
         }
         for point in np.flatnonzero(met | _at_the_ends(zeta, table.get("stick")))
     ]
+
+
+def place(cycle: Mapping[str, Any], unit: str) -> str:
+    """Amplitude and frequency in words."""
+    a, hertz = (_with_error(cycle[name], cycle.get(f"{name}_error")) for name in ("amplitude", "frequency_hz"))
+    return f"a = {a} {unit}, {hertz} Hz"
+
+
+def _with_error(value: float, error: Optional[float]) -> str:
+    return f"{value:.5g}" + ("" if error is None else f" +- {error:.1g}")
+
+
+def _errors(table: Mapping[str, Any], point: int) -> dict[str, Optional[float]]:
+    """To first order, with the slopes of the parabola through the points around."""
+    unknown = dict.fromkeys(("amplitude_error", "frequency_hz_error"))
+    if "zeta_error" not in table:
+        return unknown
+    a = np.asarray(table["amplitude"])
+    apart = np.flatnonzero(np.abs(np.log(a / a[point])) > ONE_POINT)
+    rows = [*apart[apart < point][-1:], point, *apart[apart > point][:1]]
+    x = a[rows] - a[point]
+    if len(rows) < 2 or len(rows) == 3 and x[0] * x[2] > 0:  # at a fold there is no slope
+        return unknown
+    zeta, hertz = (np.polyfit(x, np.asarray(table[name])[rows], len(rows) - 1)[-2] for name in OF_A_CYCLE)
+    if not np.isfinite(table["zeta_error"][point]) or not zeta:
+        return unknown
+    amplitude_error = float(table["zeta_error"][point] / abs(zeta))
+    frequency_error = float(table["omega_error"][point] / (2 * np.pi) + abs(hertz) * amplitude_error)
+    return {"amplitude_error": amplitude_error, "frequency_hz_error": frequency_error}
 
 
 def _at_the_ends(zeta: Array, stick: Optional[Array]) -> npt.NDArray[np.bool_]:

@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Indices
 from ..files.lock import is_taken
 from ..post.largest import largest
-from ..post.limit_cycles import stability
+from ..post.limit_cycles import place, stability
 from ..post.mode_curve import most_damped, without_rounding
 from ..texts import counted
 from ..units import units_of
@@ -116,9 +116,7 @@ class Overview:
 
     def _cycles(self) -> list[str]:
         return [
-            f"{_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} {self.unit},"
-            f" {cycle['frequency_hz']:.5g} Hz: {stability(cycle)}"
-            for cycle in self.limit_cycles
+            f"{_wave(cycle)}limit cycle at {place(cycle, self.unit)}: {stability(cycle)}" for cycle in self.limit_cycles
         ]
 
     def _ending(self) -> list[str]:
