@@ -217,3 +217,41 @@ def test_a_wave_has_a_whole_number_of_diameters_and_an_own_mode(other: fw.Linear
                 found([1.0, 2.0], diameters, order)  # type: ignore[arg-type]
     with pytest.raises(fw.InputError, match="do not fit the sector"):
         SECTOR.around(other, 1)
+
+
+CHANGES: dict[str, Any] = {
+    "a number": lambda slider: slider.parameters.update(friction_limit=3.0),
+    "an array": lambda slider: slider.parameters["tangential_stiffness"].fill(80.0),
+    "one more": lambda slider: slider.parameters.update(gap=0.0),
+    "one less": lambda slider: slider.parameters.pop("friction_limit"),
+    "B": lambda slider: slider.B.fill(2.0),
+    "the law": lambda slider: setattr(slider, "law", "regularised_coulomb"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_model_does_not_answer_for_contacts_that_have_changed(change: str) -> None:
+    """The branch of the old ones came out, in a loop over friction the same one every time."""
+    values = {"tangential_stiffness": np.array([40.0]), "friction_limit": 1.0}
+    slider = fw.Contact("jenkins", np.array([[0.0, 1.0]]), values)
+    model = fw.Model(M, K, contacts=[slider])
+    mode = fw.NonlinearMode(model, fw.choose_harmonics(model, 3))
+    assert fw.follow(mode, 0.01, 0.1, steps=FEW)
+    CHANGES[change](slider)
+    for asked in (
+        lambda: fw.linear_modes(model, 1),
+        lambda: fw.NonlinearMode(model, mode.harmonics, start=mode.start),
+        lambda: fw.follow(mode, 0.01, 0.1, steps=FEW),
+        lambda: fw.balanced(model, mode.start),
+    ):
+        with pytest.raises(fw.InputError, match=r"contact has changed[\s\S]*contact 'contact'[\s\S]*the model took"):
+            asked()
+
+
+def test_contacts_of_a_model_are_not_exchanged() -> None:
+    """One that was appended to its list had no force."""
+    model = model_of()
+    with pytest.raises(AttributeError):
+        model.contacts = []  # type: ignore[misc]
+    with pytest.raises(AttributeError):
+        model.contacts.append(model.contacts[0])  # type: ignore[attr-defined]

@@ -46,6 +46,7 @@ class HarmonicProblem(Destroyable):
     def __init__(
         self, model: Model, harmonics: Harmonics, prefix: str, core: _core.HarmonicProblem, rest: Rest | None = None
     ) -> None:
+        model.check_unchanged()
         self.model, self.harmonics, self.prefix, self.core, self.rest = model, harmonics, prefix, core, rest
         self._error: _core.DiscretisationError | None = None
         #: What `errors` has taken [s].

@@ -24,6 +24,7 @@ from .contact import Contact, contact_list
 from .omitted import OmittedModes
 from .rest import Rest
 from .sectors import Given, Term, by_sector, real_csr
+from .unchanged import Taken
 from .wheel_matrix import WheelMatrix
 
 if MPI.COMM_WORLD.size > 1:
@@ -92,17 +93,34 @@ class Model(Destroyable):
         self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
         self._own: list[PETSc.Mat] = [self._matrix(matrix, "KCM"[order]) for matrix, order, _ in terms]
         self._places = [(order, k) for _, order, k in terms]
-        self.contacts = contact_list(contacts)
+        given = contact_list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
         self._laws: list[Any] = []
         #: The static state that the laws have taken as theirs last.
         self.at_rest: Rest | None = None
-        groups = [self._group(contact) for contact in self.contacts]
+        groups = [self._group(contact) for contact in given]
+        self._taken = [Taken(contact) for contact in given]
         theta = 2 * np.pi * nodal_diameter / sectors
         self._core: _core.Model | None = _core.Model(
             [(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta, unit if unit > 1 else 0
         )
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """As they were given; others take another model."""
+        return tuple(taken.contact for taken in self._taken)
+
+    def check_unchanged(self) -> None:
+        """Its contacts are what they were when it was made.
+
+        Raises
+        ------
+        InputError
+            A parameter, a law or B is another now, which the model does not follow.
+        """
+        for taken in self._taken:
+            taken.check()
 
     @property
     def core(self) -> _core.Model:

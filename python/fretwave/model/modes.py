@@ -94,6 +94,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
         given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
     count = _number(count)
+    model.check_unchanged()
     _check_factor(model)
     try:
         found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)

@@ -77,7 +77,8 @@ def follow(
     Raises
     ------
     InputError
-        The range is empty, the start is not in it, or the problem is none of these.
+        The range is empty, the start is not in it, or the problem is none of these; a contact has changed since its
+        model was made.
 
     Examples
     --------
@@ -101,6 +102,7 @@ def follow(
     if accuracy is not None and not 0 < accuracy < 1:
         fix = "give for example accuracy=1e-3"
         raise InputError("accuracy is a share of what is computed", None, accuracy, "above 0, below 1", fix)
+    problem.model.check_unchanged()
     own = isinstance(start, PETSc.Vec)
     y0: PETSc.Vec = start if own else problem.initial(float(start))
     first = problem.parameter(y0) if own else float(start)

@@ -57,6 +57,7 @@ class Transient:
                 "a model of the whole structure",
                 "integrate the wheel: sector.wheel()",
             )
+        model.check_unchanged()
         self.model = model
         parts = [
             (order, model.vector(level * np.real(P)), model.vector(-level * np.imag(P)))
