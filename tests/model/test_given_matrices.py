@@ -72,6 +72,21 @@ def test_every_kind_of_matrix_is_the_same_one(kind: str) -> None:
     assert lowest(M=sp.csr_matrix(M), C=given) == pytest.approx(OMEGA, rel=TIGHT)
 
 
+@pytest.mark.parametrize("triangle", [np.triu, np.tril, lambda A: sp.csr_matrix(np.triu(A))])
+def test_a_triangle_of_the_mass_is_refused(triangle: Any) -> None:
+    """It was taken for all of it: files hold one triangle, and the frequency was another."""
+    half = triangle(M + [[0.0, 0.05], [0.05, 0.0]])
+    for asked in (lambda: lowest(M=half), lambda: lowest(M={0: half}), lambda: fw.reduce(half, K, keep=[0], modes=1)):
+        with pytest.raises(fw.InputError, match=r"mass matrix is not symmetric[\s\S]*0\.05"):
+            asked()
+
+
+@pytest.mark.parametrize("modes", [2.5, "2", [1]], ids=str)
+def test_component_modes_are_counted(modes: Any) -> None:
+    with pytest.raises(fw.InputError, match=r"modes are counted[\s\S]*whole number"):
+        fw.reduce(M, K, keep=[0], modes=modes)
+
+
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_kind_of_contact_map_is_the_same_one(kind: str) -> None:
     B = getattr(sp, f"{kind}_matrix")(np.array([[0.0, 1.0]]))

@@ -40,6 +40,20 @@ def test_a_force_has_a_number_for_every_dof(force: Any, mode: fw.NonlinearMode) 
         fw.ForcedResponse(mode.model, mode.harmonics, {1: force}, 1.0, 0, mode.start)
 
 
+@pytest.mark.parametrize("force", [[1.0, 0.0], {1.0: [1.0, 0.0]}, {"1": [1.0, 0.0]}, None], ids=str)
+def test_a_force_has_whole_orders(force: Any, mode: fw.NonlinearMode) -> None:
+    """Python's own errors came out."""
+    with pytest.raises(fw.InputError, match=r"no harmonics[\s\S]*whole orders"):
+        fw.ForcedResponse(mode.model, mode.harmonics, force, 1.0, 0, mode.start)
+
+
+@pytest.mark.parametrize("load", [[0.0, np.nan], [np.inf, 0.0], [0.0, 1.0 + 1.0j], [1.0], 1.0, None], ids=str)
+def test_a_static_load_is_a_real_number_for_every_dof(load: Any) -> None:
+    """Of a complex one the real part acted; one that is no number was said to want a stop."""
+    with pytest.raises(fw.InputError, match=r"does not fit the model[\s\S]*\(2,\) finite real numbers"):
+        fw.static_preload(model_of(), load)
+
+
 @pytest.mark.parametrize("kind", [complex, object])
 def test_a_row_without_imaginary_part_is_real(kind: type, mode: fw.NonlinearMode) -> None:
     row = np.array([0.0, 2.0], dtype=kind)

@@ -11,9 +11,11 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..errors import InputError
+from ..given import whole
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
+from ..texts import shortened
 from .harmonic_problem import HarmonicProblem, check_mode
 from .harmonics import Harmonics
 from .observed import Observed, named, row_of
@@ -63,6 +65,9 @@ class ForcedResponse(HarmonicProblem):
 
     @staticmethod
     def _blocks(model: Model, harmonics: Harmonics, force: Mapping[int, npt.NDArray[Any]]) -> PETSc.Vec:
+        if not isinstance(force, Mapping) or None in map(whole, force):
+            measured, fix = shortened(repr(force)), "write {1: P}, P one number a dof"
+            raise InputError("the force has no harmonics", "force", measured, "a dict by whole orders", fix)
         blocks = np.zeros((model.n_dof, harmonics.block_size))
         for order, P in force.items():
             if order not in harmonics.orders:

@@ -48,7 +48,7 @@ def check_entries(letter: str, A: Sparse, where: str) -> InputError | None:
     )
 
 
-def check_symmetric(letter: str, A: Sparse, where: str, dofs: Sequence[str]) -> InputError | None:
+def check_symmetric(letter: str, A: Sparse, where: str, dofs: Sequence[object]) -> InputError | None:
     """Measured asymmetry and the worst pair of entries."""
     difference = (A - A.T).tocoo()
     scale = abs(A).max()

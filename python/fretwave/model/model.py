@@ -19,7 +19,7 @@ from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
 from ..units import SI, UnitSystem, unit_system
-from .checks import check_entries
+from .checks import check_entries, check_symmetric
 from .contact import Contact, contact_list
 from .omitted import OmittedModes
 from .rest import Rest
@@ -91,7 +91,7 @@ class Model(Destroyable):
         if comm is None:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
         self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
-        self._own: list[PETSc.Mat] = [self._matrix(matrix, "KCM"[order]) for matrix, order, _ in terms]
+        self._own: list[PETSc.Mat] = [self._matrix(A, "KCM"[order], k) for A, order, k in terms]
         self._places = [(order, k) for _, order, k in terms]
         given = contact_list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
@@ -139,7 +139,7 @@ class Model(Destroyable):
     def _terms(self) -> list[tuple[PETSc.Mat, int, int]]:
         return [(A, order, k) for A, (order, k) in zip(self._matrices, self._places)]
 
-    def _matrix(self, A: Given, letter: str) -> PETSc.Mat:
+    def _matrix(self, A: Given, letter: str, ahead: int = 0) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
             return A
         A = A if isinstance(A, WheelMatrix) else _entries(A, letter)
@@ -148,12 +148,21 @@ class Model(Destroyable):
             raise InputError(
                 "a matrix of the model is not square", None, f"({n}, {columns})", "n x n", "give a square matrix"
             )
+        if letter == "M" and not ahead and not isinstance(A, WheelMatrix):
+            self._check_mass(A)
         begin, end = self._rows(n)
         local = A.rows(begin, end) if isinstance(A, WheelMatrix) else A[begin:end]
         size = (end - begin, n)
         mat = PETSc.Mat().createAIJ((size, size), csr=(local.indptr, local.indices, local.data), comm=self.comm)
         mat.assemble()
         return mat
+
+    @staticmethod
+    def _check_mass(M: sp.csr_matrix) -> None:
+        """Flow and rotation leave K and C unsymmetric, nothing leaves inertia so: one triangle of M was given."""
+        wrong = check_symmetric("M", M, "M", range(M.shape[0]))
+        if wrong:
+            raise wrong
 
     def _rows(self, n: int) -> tuple[int, int]:
         """PETSc's own split of n rows, in whole units."""
@@ -233,7 +242,7 @@ class Model(Destroyable):
         InputError
             They are no real numbers, or not one a dof.
         """
-        return PETSc.Vec().createWithArray(np.array(self.distribute(self._of_dofs(values))), comm=self.comm)
+        return PETSc.Vec().createWithArray(np.array(self.distribute(self.numbers(values))), comm=self.comm)
 
     def inertia(self, x: npt.ArrayLike) -> Array:
         """M x (n_dof,) of a displacement given whole, on every rank. Collective.
@@ -243,14 +252,23 @@ class Model(Destroyable):
         InputError
             As of `vector`.
         """
-        whole: Array = on_all_ranks(self.comm, self._product(self._mass, self.distribute(self._of_dofs(x))))
+        whole: Array = on_all_ranks(self.comm, self._product(self._mass, self.distribute(self.numbers(x))))
         return whole
 
-    def _of_dofs(self, values: npt.ArrayLike) -> Array:
+    def numbers(self, values: npt.ArrayLike) -> Array:
+        """An array (n_dof,) as finite real numbers.
+
+        Raises
+        ------
+        InputError
+            They are none, or not one a dof.
+        """
         given = np.asarray(values)
+        measured, expected = f"{given.shape} of {given.dtype}", f"({self.n_dof},) finite real numbers"
         if given.shape == (self.n_dof,) and given.dtype.kind in "biuf":
-            return given.astype(float, copy=False)
-        measured, expected = f"{given.shape} of {given.dtype}", f"({self.n_dof},) real numbers"
+            if np.isfinite(given).all():
+                return given.astype(float, copy=False)
+            measured = f"{np.count_nonzero(~np.isfinite(given))} entries that are not finite"
         raise InputError("an array does not fit the model", None, measured, expected, "give one real number a dof")
 
     def local_inertia(self, q: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:

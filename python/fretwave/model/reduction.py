@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..given import whole
 from ..mpi.destroyable import Destroyable, Destroyed
 from ..mpi.gather import on_all_ranks
 from .frequency_error import FrequencyError, frequency_error
@@ -275,4 +276,7 @@ def _count(modes: int | None, highest_hz: float | None) -> int:
         raise InputError(
             "highest_hz is no frequency", None, highest_hz, "> 0 Hz", "give a frequency, or a number of modes"
         )
-    return COMPONENT_MODES if modes is None else modes
+    count = COMPONENT_MODES if modes is None else whole(modes)
+    if count is None:
+        raise InputError("component modes are counted", "modes", repr(modes), "a whole number", "give their number")
+    return count

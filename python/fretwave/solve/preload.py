@@ -141,7 +141,7 @@ def static_preload(
     NotConverged
         With the load factor that was reached.
     """
-    load = np.asarray(load, dtype=float)
+    load = model.numbers(load)
     reference = reference or linear_modes(model, 1)[0]
     rest = balanced(model, reference)
     load = load if balance else load - rest.load
