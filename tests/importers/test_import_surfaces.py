@@ -81,6 +81,16 @@ def test_patch_of_meshes_that_do_not_match(kind: str, other: str, tmp_path: Path
     assert np.diff(sp.csr_matrix(joint.B).indptr).max() > 6  # a row of several nodes of the other side
 
 
+@pytest.mark.parametrize("apart", [0.01, -0.01])
+def test_sides_that_stand_off_touch(apart: float, tmp_path: Path) -> None:
+    """Their distance along the normals is said, of either sign, whichever way they look; it is no gap."""
+    stack = Stack(tmp_path, "C3D8", "C3D8")
+    stack.nodes.coordinates[stack.nodes.numbers > 1000] += apart * stack.turn[:, 2]
+    joint = match("joint", stack.nodes, "A", "B", None, stack.labels, 0.02, notes=stack.notes)
+    assert f"; along the normals {apart:g} to {apart:g} (below zero they overlap)" in stack.notes[0]
+    assert "gap" not in joint.parameters
+
+
 def test_projection_of_a_matching_mesh_is_node_to_node(tmp_path: Path) -> None:
     """Where the second side has more nodes, those under the first ones take all the weight."""
     below, above = Box("C3D8", (2, 2, 1), (0, 0, 0), (2, 1, 1)), Box("C3D8", (3, 2, 1), (0, 0, 1), (3, 1, 2))

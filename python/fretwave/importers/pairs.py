@@ -180,10 +180,14 @@ def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: flo
     if not alone and not len(left) and len(both) == len(b.numbers):
         weights = sp.csr_matrix((np.ones(len(both)), (np.arange(len(both)), partner)), shape=(len(both),) * 2)
         check_facing(normals, b, partner)
-        wide = distance.max() > reach_of(nodes, None)
-        return Found(both, b.numbers, weights, f"its nodes are up to {distance.max():.2g} apart" if wide else "")
+        usual = reach_of(nodes, None)
+        note = f"its nodes are up to {distance.max():.2g} apart" if distance.max() > usual else ""
+        return Found(both, b.numbers, weights, note + _clearance(normals, weights @ b.points - a.points, usual))
     if b.faces:
-        return _projected(a, b, both, (normals, partner), where, reach)
+        found = _projected(a, b, both, (normals, partner), where, reach)
+        mine = slice(None) if found.kept is None else found.kept
+        way = found.weights @ b.points - a.points[mine]
+        return replace(found, note=found.note + _clearance(normals[mine], way, reach_of(nodes, None)))
     distance_b = cKDTree(a.points).query(b.points[left])[0] if len(left) else []
     alone += [f"{n} ({d:.3g} away)" for n, d in zip(b.numbers[left], distance_b)]
     raise InputError(
@@ -195,6 +199,15 @@ def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: flo
         f"one node of the other set within {reach:.3g}, or faces of elements under the second set",
         "mesh both sides alike, name surfaces of the deck, widen --tolerance, or give a CSV of pairs",
     )
+
+
+def _clearance(normals: Array, way: Array, usual: float) -> str:
+    """That pairs touch all the same, where the second side's places (n, 3) stand off along normals (n, 3)."""
+    along = np.einsum("nx,nx->n", normals, way) / np.linalg.norm(normals, axis=1)
+    if not abs(along).max(initial=0.0) > usual:
+        return ""
+    which = f"along the normals {along.min():.3g} to {along.max():.3g} (below zero they overlap)"
+    return f"; {which}: the pairs touch all the same, unless the contact in the case has a `gap`"
 
 
 def _projected(a: Side, b: Side, both: IntArray, looks: tuple[Array, IntArray], where: str, reach: float) -> Found:
