@@ -150,23 +150,51 @@ def test_a_gap_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Non
     assert "contact 'joint': its nodes are up to 0.002 apart" in capfd.readouterr().out
 
 
-def test_nodes_that_depend_on_others(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """A direction of a contact's node that has no row is held by *BOUNDARY, or else it is that of an *EQUATION."""
-    two = Two()
-    command, nodes = two.write(tmp_path, True), len(two.nodes)
-    names = [f"{node}.{direction}" for node in range(1, nodes + 1) for direction in (1, 2, 3)]
-    kept = [k for k, name in enumerate(names) if name != f"{two.ends[0]}.2"]
-    (tmp_path / "rows.dof").write_text("".join(f"{names[k]}\n" for k in kept))
+def without(two: Two, folder: Path, direction: int) -> list[str]:
+    """The import of two bodies in whose matrices a node of the contact has no row of a direction."""
+    command, nodes = two.write(folder, True), len(two.nodes)
+    names = [f"{node}.{axis}" for node in range(1, nodes + 1) for axis in (1, 2, 3)]
+    kept = [k for k, name in enumerate(names) if name != f"{two.ends[0]}.{direction}"]
+    (folder / "rows.dof").write_text("".join(f"{names[k]}\n" for k in kept))
     for letter, A in (("M", two.M), ("K", two.K)):
-        sp.save_npz(tmp_path / f"{letter}.npz", sp.csr_matrix(A[kept][:, kept]))
-    command = [*command[:2], "--mass", str(tmp_path / "M.npz"), "--stiffness", str(tmp_path / "K.npz"), *command[-2:]]
-    command += ["--dofs", str(tmp_path / "rows.dof"), *LEFT_RIGHT]
-    deck = (tmp_path / "n.inp").read_text() + "*EQUATION\n2\n5,2,1.,6,2,-1.\n"
+        sp.save_npz(folder / f"{letter}.npz", sp.csr_matrix(A[kept][:, kept]))
+    command = [*command[:2], "--mass", str(folder / "M.npz"), "--stiffness", str(folder / "K.npz"), *command[-2:]]
+    return [*command, "--dofs", str(folder / "rows.dof"), *LEFT_RIGHT]
+
+
+@pytest.mark.parametrize("keyword", ["*EQUATION\n2\n5,2,1.,6,2,-1.\n", "*PRE-TENSION SECTION, SURFACE=CUT, NODE=6\n"])
+def test_nodes_that_depend_on_others(keyword: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """A direction of a contact's node that has no row is held by *BOUNDARY, or else it depends on others."""
+    two = Two()
+    command = without(two, tmp_path, 2)
+    deck = (tmp_path / "n.inp").read_text() + keyword
     (tmp_path / "n.inp").write_text(deck)
     text = refused(command, tmp_path, capfd)
-    assert f"measured: n{two.ends[0]}y, 1 such dofs; the deck has *EQUATION" in text
+    assert f"measured: n{two.ends[0]}y, 1 such dofs; the deck has {keyword.splitlines()[0].partition(',')[0]}" in text
     (tmp_path / "n.inp").write_text(f"{deck}*BOUNDARY\n{two.ends[0]}, 2\n")
     assert main(command) == 0
+
+
+def test_nodes_without_rows_are_doubted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Where the deck says what it holds, and holds them not: they were taken as held without a word."""
+    two = Two()
+    command, doubt = without(two, tmp_path, 2), f"no *BOUNDARY holds them (n{two.ends[0]}y, 1 such dofs): taken as held"
+    deck = (tmp_path / "n.inp").read_text()
+    for held, said in (("", False), ("2, 1, 3", True), (f"{two.ends[0]}, 1, 3", False), ("ELSEWHERE.SET, 1", False)):
+        (tmp_path / "n.inp").write_text(f"{deck}*BOUNDARY\n{held}\n" if held else deck)
+        assert main(command) == 0
+        out = capfd.readouterr()
+        assert (doubt in out.out + out.err) == said
+
+
+@pytest.mark.parametrize("apart", [0.002, -0.002])
+def test_a_gap_is_told_from_an_overlap(apart: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Neither is the pairs': whoever widens the tolerance gets contact that touches."""
+    two = Two()
+    two.nodes[len(two.first.nodes) :, 0] += apart
+    assert main([*two.write(tmp_path, True), *LEFT_RIGHT, "--tolerance", "0.003"]) == 0
+    said = f"up to 0.002 apart; along the normals {apart:g} to {apart:g} (below zero they overlap): the pairs touch"
+    assert f"contact 'joint': its nodes are {said} all the same" in capfd.readouterr().out
 
 
 def test_shells_of_calculix(tmp_path: Path) -> None:

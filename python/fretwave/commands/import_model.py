@@ -116,6 +116,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         make_sector(model, wheel, nodes, options.tolerance)
         found.notes.append(said_of(wheel, model))
     model.pairs = dict(_pairs(options, labels, nodes, wheel, found.notes))
+    found.warnings += [] if nodes is None else nodes.constraints.doubts
     check_directions(model)
     found.warnings += check_unjoined(model, where)
     if wheel is not None and nodes is not None:

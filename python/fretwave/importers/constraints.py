@@ -1,7 +1,8 @@
 """What a deck says of nodes without a row in the matrices: those it holds, and those it joins to others.
 
 A dof that depends on others (``*EQUATION``, ``*MPC``, ``*TIE``, ...) is no row either, and it moves: in a contact it
-may not be taken as held. Which dofs depend is not read: those without a row that no ``*BOUNDARY`` holds.
+may not be taken as held. Which dofs depend is not read: those without a row that no ``*BOUNDARY`` holds. Where the deck
+has none of these keywords, but says what it holds, such dofs are taken as held, with a warning.
 """
 
 from __future__ import annotations
@@ -14,15 +15,24 @@ from ..errors import InputError
 from .keywords import Lines
 
 #: Keywords that make dofs depend on others.
-JOINS = ("EQUATION", "MPC", "TIE", "RIGID BODY", "COUPLING", "KINEMATIC COUPLING", "KINEMATIC", "DISTRIBUTING COUPLING")
+JOINS = (
+    *("EQUATION", "MPC", "TIE", "RIGID BODY", "COUPLING", "KINEMATIC COUPLING", "KINEMATIC", "DISTRIBUTING COUPLING"),
+    *("PRE-TENSION SECTION", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT"),
+)
 
 
 @dataclass
 class Constraints:
-    """Lines of ``*BOUNDARY`` (node or set in capitals, first and last direction), and the first keyword that joins."""
+    """Lines of ``*BOUNDARY`` (node or set in capitals, first and last direction), and the first keyword that joins.
+
+    Attributes
+    ----------
+    doubts : warnings of contacts that were checked
+    """
 
     held: list[tuple[str, int, int]] = field(default_factory=list)
     joins: str = ""
+    doubts: list[str] = field(default_factory=list)
 
     def add(self, keyword: str, data: Lines) -> None:
         """A keyword of the deck; Abaqus' named conditions (ENCASTRE) hold all directions."""
@@ -36,7 +46,7 @@ class Constraints:
     def check(
         self, name: str, numbers: Iterable[int], labels: IntArray, sets: Mapping[str, IntArray], where: str
     ) -> None:
-        """No node of a contact depends on others.
+        """No node of a contact depends on others; a doubt where nothing tells why one has no row.
 
         Parameters
         ----------
@@ -49,12 +59,18 @@ class Constraints:
         InputError
             A direction of a node is no row, and nothing holds it.
         """
-        if not self.joins:
+        told = all(held.isdigit() or held in sets for held, _, _ in self.held)
+        if not self.joins and not (self.held and told):
             return
         rows = {(node, direction) for node, direction in labels.tolist()} | self._held(sets)
-        loose = [(node, axis) for node in numbers for axis in (1, 2, 3) if (node, axis) not in rows]
-        if loose:
-            measured = f"n{loose[0][0]}{'xyz'[loose[0][1] - 1]}, {len(loose)} such dofs; the deck has {self.joins}"
+        known = [axis for axis in (1, 2, 3) if self.joins or axis in labels[:, 1]]  # a plane model has no third
+        loose = [(node, axis) for node in numbers for axis in known if (node, axis) not in rows]
+        first = f"n{loose[0][0]}{'xyz'[loose[0][1] - 1]}, {len(loose)} such dofs" if loose else ""
+        if loose and not self.joins:
+            said = f"nodes have no row in the matrices, and no *BOUNDARY holds them ({first}): taken as held"
+            self.doubts.append(f"contact '{name}': {said}")
+        elif loose:
+            measured = f"{first}; the deck has {self.joins}"
             expected = "each direction a row of the matrices, or held in the deck"
             fix = f"take {self.joins} off these nodes and export the matrices again"
             raise InputError(f"nodes of contact '{name}' depend on others", where, measured, expected, fix)
