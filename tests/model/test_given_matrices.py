@@ -188,3 +188,25 @@ def test_what_one_rank_alone_meets_is_no_matter_of_all(monkeypatch: pytest.Monke
     monkeypatch.setattr(modes, "_wrong_terms", lambda model: pytest.fail("asked of all ranks"))
     with fw.Model(M, K) as model, pytest.raises(fw.errors.PetscError, match="alone"):
         fw.linear_modes(model, 1)
+
+
+WAVES: dict[str, dict[str, Any]] = {
+    "half a diameter": {"sectors": 6, "nodal_diameter": 1.5},
+    "a diameter as float": {"sectors": 6, "nodal_diameter": 1.0},
+    "half a sector": {"sectors": 6.5, "nodal_diameter": 1},
+    "no sector": {"sectors": 0},
+    "minus six": {"sectors": -6, "nodal_diameter": 1},
+}
+
+
+@pytest.mark.parametrize("wave", WAVES)
+def test_a_wave_closes_around_the_wheel(wave: str) -> None:
+    """Of 1.5 nodal diameters on six sectors there was a frequency."""
+    terms: dict[int, Any] = {0: [[3.0]], 1: [[-1.0]], -1: [[-1.0]]}
+    with pytest.raises(fw.InputError, match="whole number of times around"):
+        fw.Model([[1.0]], terms, **WAVES[wave])
+    for diameters in (1.5, 1.0):
+        with pytest.raises(fw.InputError, match="whole number of nodal diameters"):
+            fw.Sector([[1.0]], terms, 6).model(diameters)  # type: ignore[arg-type]
+    with pytest.raises(fw.InputError, match=r"acts on no sector[\s\S]*0\.5"):
+        fw.Model([[1.0]], {0: [[3.0]], 0.5: [[-1.0]], -0.5: [[-1.0]]}, sectors=6)  # type: ignore[dict-item]

@@ -199,3 +199,11 @@ def test_what_cannot_be_is_refused() -> None:
     narrow = fw.Pairs({**reaching, 1: np.ones((1, 2))}, 1)
     assert "is 1 x 2, not" in replace(cut(), pairs={"shroud": narrow}).complaint()
     assert cut().complaint() is None
+
+
+def test_dofs_by_their_names() -> None:
+    """One dof may have several; Python's own error named the list and not the name."""
+    given = fw.Structure(np.eye(3), np.eye(3), dofs={"tip": 1, "gauge": 1}, names=["root", "blade", "disk"])
+    assert [given.dof(name) for name in ("root", "tip", "gauge", "disk")] == [0, 1, 1, 2]
+    with pytest.raises(fw.InputError, match=r"no dof of this name[\s\S]*'rot'[\s\S]*did you mean `root`"):
+        given.dof("rot")

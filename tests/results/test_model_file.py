@@ -242,6 +242,17 @@ amplitude = [1e-8, 2e-8]
 
 
 @pytest.mark.ranks(1)
+def test_a_complex_matrix_is_not_written(tmp_path: Path) -> None:
+    """Its real part was; the file that was there stays."""
+    there = tmp_path / "model.h5"
+    fw.write_model(there, fw.Structure(np.eye(2), np.diag([1.0, 2.0])))
+    for given in ({"K": np.diag([1.0, 2.0j])}, {"C": sp.csr_matrix(np.diag([1.0, 1.0j]))}):
+        with pytest.raises(fw.InputError, match="a matrix is complex"):
+            fw.write_model(there, fw.Structure(**{"M": np.eye(2), "K": np.diag([1.0, 2.0]), **given}))
+    assert fw.read_model(there).K.toarray().tolist() == [[1.0, 0.0], [0.0, 2.0]]
+
+
+@pytest.mark.ranks(1)
 def test_case_from_a_model_file(path: Path) -> None:
     """Names of dofs, contacts with their areas, and what a reduction keeps come with the file."""
     case_file = path.with_name("case.toml")

@@ -134,7 +134,7 @@ class Sector:
 
     def model(self, nodal_diameter: int, comm: MPI.Comm | None = None) -> Model:
         """The equations of one sector in a wave of this many nodal diameters (negative: backward). Collective."""
-        terms = self._terms(period_of(nodal_diameter, self.sectors))
+        terms = self._terms(period_of(_index(nodal_diameter), self.sectors))
         units = self.structure.unit_system
         return Model(terms["M"], terms["K"], terms["C"], self.contacts, comm, self.sectors, nodal_diameter, units=units)
 

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..given import whole
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
@@ -34,6 +35,16 @@ if MPI.COMM_WORLD.size > 1:
 def _tangents(contact: Contact) -> int:
     """Components beside the normal one."""
     return contact.components - (contact.info.normal is not None)
+
+
+def _check_wave(sectors: int, nodal_diameter: int) -> None:
+    """A wave closes around the wheel."""
+    if (whole(sectors) or 0) < 1 or whole(nodal_diameter) is None:
+        measured, expected = (
+            f"sectors={sectors!r}, nodal_diameter={nodal_diameter!r}",
+            "whole numbers, one sector or more",
+        )
+        raise InputError("a wave goes a whole number of times around a wheel", None, measured, expected, "round them")
 
 
 def _entries(given: Given, letter: str, where: str | None = None) -> sp.csr_matrix:
@@ -84,6 +95,7 @@ class Model(Destroyable):
         units: str | UnitSystem = SI,
         omitted: OmittedModes | None = None,
     ) -> None:
+        _check_wave(sectors, nodal_diameter)
         self.units = unit_system(units) if isinstance(units, str) else units
         self.omitted = omitted
         terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]

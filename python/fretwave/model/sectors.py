@@ -76,6 +76,10 @@ def by_sector(given: Term | None) -> Parts:
         return {}
     if not is_by_sector(given):
         return {0: given}
+    wrong = [k for k in given if whole(k) is None]
+    if wrong:
+        measured, fix = ", ".join(map(repr, wrong)), "give {0: own, 1: on the next sector, ...}"
+        raise InputError("a matrix acts on no sector", None, measured, "whole numbers of sectors ahead", fix)
     if 0 not in given:
         raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")
     return {k: given[k] for k in sorted(given, key=lambda k: (k != 0, k))}

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..errors import InputError
+from ..texts import nearest, shortened
 from ..units import SI, UnitSystem, unit_system
 from .consistency import complaint_of
 from .omitted import UNKNOWN, OmittedModes
@@ -156,8 +157,20 @@ class Structure:
         return names
 
     def dof(self, name: str, sector: int = 0) -> int:
-        """Number of a dof; on a whole wheel that of a sector's."""
-        return self.dof_names.index(f"{name}@{sector}" if self.whole else name)
+        """Number of a dof; on a whole wheel that of a sector's.
+
+        Raises
+        ------
+        InputError
+            There is none of this name.
+        """
+        wanted, known = f"{name}@{sector}" if self.whole else name, self.dof_names
+        if wanted in self.dofs:  # one of several names of a dof
+            return self.dofs[wanted]
+        if wanted not in known:
+            fix = nearest(wanted, known) or "`dof_names` lists them"
+            raise InputError("there is no dof of this name", None, repr(wanted), shortened(", ".join(known), 60), fix)
+        return known.index(wanted)
 
     def places(self, name: str) -> list[int]:
         """Numbers of a dof in all sectors of a whole wheel; of a structure or of one sector that of `dof` alone."""

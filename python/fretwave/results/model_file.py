@@ -50,7 +50,7 @@ from ..files.compressed import check_compressed
 from ..files.whole import Unfailing, check_whole, replaced, seal
 from ..model.cells import KINDS
 from ..model.pairs import Pairs
-from ..model.sectors import by_sector
+from ..model.sectors import by_sector, real_csr
 from ..model.structure import Structure
 from ..texts import display, names_beside, nearest
 from ..units import SYSTEMS, unit_system
@@ -193,8 +193,7 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, Table]) -> None:
 
 
 def _write_sparse(group: h5py.Group, matrix: sp.spmatrix) -> None:
-    rows = sp.csr_matrix(matrix, dtype=float)
-    rows.sort_indices()
+    rows = real_csr(matrix, group.name).sorted_indices()
     group.attrs["shape"] = np.array(rows.shape, dtype="<i8")
     for key in ("data", "indices", "indptr"):
         group[key] = getattr(rows, key)
