@@ -40,6 +40,9 @@ def test_values_of_a_run_that_is_done_and_of_one_that_was_killed(tmp_path, done)
     assert (mode.dofs, mode.labels) == (["tip", "root"], ["1c", "1s"])
     assert "5 points" in repr(run) and "zeta" in repr(mode)
     np.testing.assert_array_equal(run.table("mode")["amplitude"], AMPLITUDES)
+    column = mode["amplitude"]
+    column *= 1e3  # of the script alone
+    np.testing.assert_array_equal(mode["amplitude"], AMPLITUDES)
 
 
 def test_what_is_not_there_is_said(tmp_path):

@@ -47,6 +47,18 @@ def test_reading_gets_better_by_the_fourth_power_of_the_step_and_a_straight_line
     assert cubic[-1] < 1e-3 * straight[-1]
 
 
+def test_columns_that_a_script_changes_are_its_own(tmp_path):
+    """``percent = branch["zeta"]; percent *= 100`` made the saved table and pictures of it a hundred times larger."""
+    branch = fw.follow(mode(), 0.5, 1.0, steps=steps(0.2))
+    there = {"branch": branch, "reading": branch.at([0.6, 0.8])}
+    for name, table in there.items():
+        before, percent = table["zeta"], table["zeta"]
+        percent *= 100.0
+        np.testing.assert_array_equal(table["zeta"], before, name)
+    branch.save(tmp_path / "branch.h5")
+    np.testing.assert_allclose(fw.Branch.load(tmp_path / "branch.h5")["zeta"], C / 2 / branch["omega0"], rtol=1e-6)
+
+
 def test_all_responses_at_a_frequency_are_found_where_the_branch_folds():
     """((k + 3/4 g a^2 - w^2)^2 + (c w)^2) a^2 = F^2: three amplitudes between the folds."""
     F, omega = 0.1, 2.25

@@ -71,13 +71,13 @@ class Analysis:
         return len(next(iter(self.columns.values()), ()))
 
     def __getitem__(self, column: str) -> Any:
-        """A column of the table, "event" and others of words among them."""
+        """A column of the table, "event" and others of words among them; a copy that may be changed."""
         words = {**self.words, "event": self.events}
         if column in words:
             return np.array(words[column])
         if column not in self.columns:
             raise KeyError(f"no column '{column}' in '{self.name}'; there are {', '.join(self.columns)}")
-        return self.columns[column]
+        return np.array(self.columns[column])
 
     def __repr__(self) -> str:
         status = self.attributes.get("status", "")
@@ -248,11 +248,7 @@ class Analysis:
         if self.meaning is None or not len(self):
             what, fix = self.kind if self.meaning is None else "no points", "mode, forced, flutter, or a sweep of these"
             raise InputError("the analysis has no branch to read", self.name, what, None, fix)
-        tables = []
-        for first, curve in self._curves:
-            tables.append(read(curve))
-            tables[-1]["place"][:] += first
-        return Reading.joined(tables)
+        return Reading.joined([read(curve).moved("place", first) for first, curve in self._curves])
 
     @cached_property
     def _curves(self) -> list[tuple[int, Curve]]:

@@ -50,6 +50,10 @@ class Table:
         columns = tables[0].columns
         return Table(columns, {c.name: np.concatenate([table[c.name] for table in tables]) for c in columns})
 
+    def moved(self, name: str, by: float) -> Table:
+        """The same with a number added to all of a column."""
+        return Table(self.columns, {**self._values, name: self._values[name] + by})
+
     @property
     def names(self) -> list[str]:
         """Names of the columns."""
@@ -76,11 +80,11 @@ class Table:
     @overload
     def __getitem__(self, key: int) -> dict[str, Value]: ...
     def __getitem__(self, key: str | int) -> AnyArray | dict[str, Value]:
-        """A column by its name, or a row by its number."""
+        """A column by its name, a copy that may be changed, or a row by its number."""
         if isinstance(key, str):
             if key not in self._values:
                 raise KeyError(f"no column '{key}'; there are {', '.join(self.names)}")
-            return self._values[key]
+            return self._values[key].copy()
         return {name: values[key].item() for name, values in self._values.items()}
 
     def __iter__(self) -> Iterator[dict[str, Value]]:
