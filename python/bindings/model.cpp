@@ -99,10 +99,10 @@ void bind_model(nb::module_& m) {
       .value("stuck", model::ContactState::stuck)
       .value("free", model::ContactState::free)
       .value("linearised", model::ContactState::linearised);
-  m.def("linear_modes", [](Model const& mod, int count, model::ContactState state,
-                           std::optional<double> near) {
+  m.def("linear_modes", [](Model const& mod, int count, model::ContactState state, std::optional<double> near,
+                           bool stable) {
     nb::list out;
-    for (auto const& mode : model::linear_modes(mod, count, state, near))
+    for (auto const& mode : model::linear_modes(mod, count, state, near, stable))
       out.append(nb::make_tuple(mode.omega, mode.beta, Petsc<Vec>{mode.shape}, Petsc<Vec>{mode.imaginary}));
     return out;
   });

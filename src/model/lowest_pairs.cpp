@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "error.h"
 #include "model/inertia.h"
 #include "model/mode_orientation.h"
 #include "text.h"
@@ -97,6 +98,11 @@ PetscInt found_below(double lambda, Pairs const& found) {
   return PetscInt(std::count_if(found.begin(), found.end(), [&](auto const& p) { return p.value < lambda; }));
 }
 
+[[noreturn]] void name_unstable(std::string const& measured) {
+  throw InputError("the structure is statically unstable: its stiffness is negative for some motion",
+                   measured, "all eigenvalues of K with stuck contact > 0", "check the signs of K");
+}
+
 /// Eigenvalues between the lowest found, or the shift, and a bound. Only those of a structure that is
 /// unstable lie below.
 PetscInt counted_below(Pencil const& pencil, double lambda, Pairs const& found) {
@@ -104,7 +110,10 @@ PetscInt counted_below(Pencil const& pencil, double lambda, Pairs const& found) 
   if (all <= found_below(lambda, found)) return all;
   const double lowest = std::min(pencil.shift, found.front().value);
   const double floor = lowest - 10 * width(pencil, lowest) - std::abs(pencil.shift);
-  return all - (count_below(pencil.K, pencil.M, floor, "modes_count_") - pencil.constraints);
+  const PetscInt unstable = count_below(pencil.K, pencil.M, floor, "modes_count_") - pencil.constraints;
+  if (pencil.stable && unstable > 0)
+    name_unstable(std::to_string(unstable) + " negative pivots of K - (" + short_text(floor) + " 1/s^2) M");
+  return all - unstable;
 }
 
 /// How far from the shift the `count` nearest ones reach, and what cannot be told from the last of them.
@@ -198,6 +207,16 @@ std::vector<EigenPair> lowest_pairs(Pencil const& pencil, PetscInt count) {
   }
   if (missing > 0) name_missing(missing, lambda);
   return found;
+}
+
+void expect_stable(Pencil const& pencil, std::vector<EigenPair> const& pairs) {
+  constexpr double small = 1e-3;  // of the first eigenvalue above zero: digits that a printed matrix lacks
+  if (pairs.empty() || pairs.front().value >= 0) return;
+  auto const& [value, vector] = pairs.front();
+  const auto first = std::ranges::find_if(pairs, [](auto const& pair) { return pair.value > 0; });
+  if (first != pairs.end() && -value < small * first->value) return;
+  if (-value > 10 * uncertainty(pencil.K, vector))
+    name_unstable("omega^2 = " + short_text(value) + " 1/s^2 of a linear mode");
 }
 
 bool is_rigid(Mat K, double scale, double value, Vec vector) {

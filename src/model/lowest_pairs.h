@@ -20,6 +20,7 @@ struct Pencil {
   PetscInt constraints;  ///< rows of a saddle point's constraints: each has a negative pivot
   double shift;          ///< where K - shift M is regular, next to the eigenvalues wanted
   double rounding;       ///< what rounding in K leaves in an eigenvalue
+  bool stable = false;   ///< a motion of negative stiffness is refused; else it is left out
 };
 
 /// The `count` eigenvalues next to the shift, or more, ascending, by SLEPc with shift-invert under the prefix
@@ -34,6 +35,10 @@ std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
 /// below zero as the first of their kind, or the last, lies above. Where all lie above the shift and none is
 /// far above the others it serves them all. Collective.
 std::vector<EigenPair> lowest_beside_zero(Pencil, PetscInt count);
+
+/// InputError where K is negative for one of these motions, ascending, beyond its rounding and beside the
+/// first that it holds. Collective.
+void expect_stable(Pencil const&, std::vector<EigenPair> const&);
 
 /// Whether an eigenvalue is that of a motion that nothing holds, but for rounding; `scale`: of the stiffest
 /// dofs. Collective.

@@ -54,7 +54,8 @@ double shift_near(double omega, double rounding) {
 }
 
 /// (K + B^H kt B) phi = w^2 M phi, far stiffer contact by its forces (`StiffContact`).
-std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std::optional<double> near) {
+std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std::optional<double> near,
+                                 bool stable) {
   const bool travelling = model.travelling();
   const int copies = travelling ? 2 : 1;
   auto stiffness = required(model, 0, "stiffness");
@@ -92,9 +93,11 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
                          .size = copies * model.dofs() - rigid,
                          .constraints = rows,
                          .shift = near ? shift_near(*near, noise) : -1e-8 * scale,
-                         .rounding = noise};
+                         .rounding = noise,
+                         .stable = stable};
   const auto pairs =
       near ? nearest_pairs(pencil, copies * wanted) : lowest_beside_zero(pencil, copies * wanted);
+  if (stable) expect_stable(pencil, pairs);
   std::vector<LinearMode> modes;
   std::vector<VecHandle> found;
   for (auto const& [value, vector] : pairs) {
@@ -113,11 +116,11 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
 }  // namespace
 
 std::vector<LinearMode> linear_modes(Model const& model, int count, ContactState state,
-                                     std::optional<double> near) {
+                                     std::optional<double> near, bool stable) {
   const bool stuck = state == ContactState::stuck;
   auto modes = state == ContactState::linearised ? damped_modes(model, count)
                : hermitian(required(model, 0, "stiffness"), model.theta())
-                   ? undamped(model, count, stuck, near)
+                   ? undamped(model, count, stuck, near, stable)
                    : circulatory_modes(model, count, stuck, near);
   std::sort(modes.begin(), modes.end(), [](auto const& a, auto const& b) { return a.omega < b.omega; });
   if (modes.size() > size_t(count)) modes.resize(size_t(count));

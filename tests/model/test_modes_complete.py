@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
-from fretwave.errors import FretwaveError
+from fretwave.errors import FretwaveError, InputError
 
 #: Wheels and chains drawn by the property test; several ranks take every 25th.
 DRAWN = 200
@@ -110,6 +110,30 @@ def test_an_unstable_direction_does_not_count_as_missed(comm):
     """One negative stiffness: its mode has omega 0 as before, and nothing else is looked for."""
     K = np.diag([-2.0, 1.0, 4.0, 9.0])
     assert [m.omega for m in fw.linear_modes(fw.Model(np.eye(4), K, comm=comm), 3, "free")] == pytest.approx([0, 1, 2])
+
+
+@pytest.mark.parametrize("n", [5, 40, 700])
+@pytest.mark.parametrize("spring", [-0.6, -1.3, -30.0])
+def test_a_structure_that_is_unstable_is_refused_where_it_has_to_be_stable(comm, n, spring):
+    """A chain between two walls, and a spring beside one of its own that outdoes it and all others or does not."""
+    K = chain(n)
+    K[2:4, 2:4] += spring * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    model = fw.Model(np.eye(n), K, comm=comm)
+    squares = np.linalg.eigvalsh(K)
+    if squares[0] < 0:
+        with pytest.raises(InputError, match="statically unstable"):
+            fw.linear_modes(model, 3, "stuck", stable=True)
+    else:
+        modes = fw.linear_modes(model, 3, "stuck", stable=True)
+        assert [mode.omega**2 for mode in modes] == pytest.approx(squares[:3], rel=1e-6, abs=1e-12)
+
+
+def test_a_rigid_motion_that_printed_digits_make_negative_is_stable(comm):
+    """Three masses in a ring of springs 1e9 / 3, printed with seven digits: -200 where zero would be."""
+    K = 9999999.0e2 * np.eye(3) - 333333400.0 * np.ones((3, 3))
+    assert np.linalg.eigvalsh(K)[0] < -100
+    modes = fw.linear_modes(fw.Model(np.eye(3), K, comm=comm), 3, stable=True)
+    assert modes[0].omega == 0 and modes[2].omega == pytest.approx(np.sqrt(1e9), rel=1e-6)
 
 
 def test_a_single_dof_has_one_mode(comm):

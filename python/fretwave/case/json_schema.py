@@ -72,10 +72,10 @@ def json_schema(laws: Mapping[str, LawInfo]) -> Schema:
         "additionalProperties": False,
         "$defs": definitions,
     }
-    return dict(_with_bounds(found))
+    return {name: _with_bounds(part) for name, part in found.items()}
 
 
-def _with_bounds(part: Any) -> Any:
+def _with_bounds(part: object) -> object:
     """The same with bounds under names that JSON schema knows."""
     if isinstance(part, list):
         return [_with_bounds(one) for one in part]

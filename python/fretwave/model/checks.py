@@ -154,8 +154,8 @@ def check_stiffness(
 def smallest_eigenvalue(values: Sparse) -> tuple[float, Array]:
     """Smallest eigenvalue of D^-1/2 A D^-1/2, D the size of A's diagonal, over the largest; and its vector.
 
-    The scaling makes the answer independent of units. Large matrices are judged by their diagonal and,
-    if that is positive, taken to be definite: the factorisation of the run reports otherwise.
+    The scaling makes the answer independent of units. Large matrices are judged by their diagonal and, if that is
+    positive, taken to be definite: the linear modes that analyses start from report otherwise, by their factors.
     """
     diagonal = np.asarray(values.diagonal())
     size = np.sqrt(np.where(diagonal == 0, 1.0, abs(diagonal)))

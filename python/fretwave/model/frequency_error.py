@@ -105,7 +105,7 @@ def _full_hz(model: Model, extra: sp.csr_matrix, count: int) -> Array:
     stiffness = K.copy()
     stiffness.axpy(1.0, stiff)
     core = _core.Model([(stiffness, 0, 0), (M, 2, 0)], [], 0.0)
-    modes = _core.linear_modes(core, count, _core.ContactState.free, None)
+    modes = _core.linear_modes(core, count, _core.ContactState.free, None, False)
     for mat in (stiff, stiffness):
         mat.destroy()
     return np.array([omega for omega, *_ in modes]) / (2 * np.pi)

@@ -59,7 +59,9 @@ class LinearMode:
         return self.omega / (2 * np.pi)
 
 
-def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: float | None = None) -> list[LinearMode]:
+def linear_modes(
+    model: Model, count: int = 6, contact: str = "stuck", near: float | None = None, stable: bool = False
+) -> list[LinearMode]:
     """Lowest linear modes, or those nearest to a frequency, in ascending order, by SLEPc. Collective.
 
     Parameters
@@ -68,6 +70,9 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
         Closed contact without slip; no contact force; the laws' tangents at rest (damped, with C).
     near : float [rad/s], optional
         By shift-invert there.
+    stable : bool
+        Refuse a structure whose stiffness is negative for some motion: that has no frequency, omega = 0 if it is found
+        at all. Of a symmetric K.
 
     Raises
     ------
@@ -77,7 +82,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     NothingMoves
         Stuck contact leaves no degree of freedom. It is an InputError.
     InputError
-        `near`, or stuck contact that is rigid, where K is not symmetric.
+        `near`, or stuck contact that is rigid, where K is not symmetric; a structure that is not `stable`.
 
     Notes
     -----
@@ -97,7 +102,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     model.check_unchanged()
     _check_factor(model)
     try:
-        found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
+        found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near, stable)
     except InputError as error:  # on all ranks
         raise (NothingMoves(*error.args) if error.what == NOTHING_LEFT else error) from None
     except PetscError as error:

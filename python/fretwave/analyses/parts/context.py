@@ -261,21 +261,24 @@ class AnalysisContext(Generic[Section]):
     def linear_mode(self, contact: str, count: int = 1, near: float | None = None) -> list[LinearMode]:
         """Linear modes, the contact ``stuck`` or ``free``, without forces of the flow. Collective.
 
+        With stuck contact the structure has to be stable.
+
         Parameters
         ----------
         near : frequency [rad/s] that they are nearest to, in place of the lowest
         """
         from ...model.modes import linear_modes
 
+        stable = contact == "stuck"
         if not with_flow_forces(self.analysis):
-            return linear_modes(self.model, count, contact, near)
+            return linear_modes(self.model, count, contact, near, stable)
         from ...case.build import build_model
 
         preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
         with build_model(self.case, (), self.comm, preload, diameters) as structure:
             if self.model.at_rest is not None:
                 structure.settle(self.model.at_rest)
-            return linear_modes(structure, count, contact, near)
+            return linear_modes(structure, count, contact, near, stable)
 
     def numbered(self, modes: list[LinearMode], number: int) -> LinearMode:
         """The one of this number, from 1, of linear modes."""
