@@ -117,12 +117,14 @@ def test_a_surface_names_faces(tmp_path: Path) -> None:
     text = first + second + node_set("A", 1, x[:, 2] == 1) + node_set("B", 1001, y[:, 2] == 1)
     text += "*SURFACE, NAME=Top, TYPE=ELEMENT\n1, S2\n2, S2\n3, S2\n4, S2\n*SURFACE, NAME=UNDER\nABOVE, S1\n"
     text += "*SURFACE, NAME=NODES, TYPE=NODE\nA, 1.\n*SURFACE, NAME=SIDE\nBELOW, S7\n"
-    text += "*SURFACE, NAME=OVER\nABOVE, S2\n"
+    text += "*SURFACE, NAME=OVER\nABOVE, S2\n*SURFACE, NAME=BOTH, COMBINE=UNION\nFRONT, BACK\n"
+    text += "*SURFACE, NAME=FRONT\n1, S2\n2, S2\n*SURFACE, NAME=BACK\n2, S2\n3, S2\n4, S2\n"
+    text += "*SURFACE, NAME=ROUND, COMBINE=UNION\nROUND\n"
     (tmp_path / "deck.inp").write_text(text)
     nodes = read_nodes(tmp_path / "deck.inp")
     labels = labels_of(nodes)
     by_sets = match("joint", nodes, "A", "B", None, labels)
-    for first_name in ("top", "NODES"):
+    for first_name in ("top", "NODES", "BOTH"):
         by_faces = match("joint", nodes, first_name, "UNDER", None, labels)
         assert abs(by_faces.B - by_sets.B).max() == 0
         np.testing.assert_array_equal(by_faces.areas, by_sets.areas)
@@ -130,6 +132,8 @@ def test_a_surface_names_faces(tmp_path: Path) -> None:
         match("joint", nodes, "TOP", "OVER", None, labels, tolerance=2.0)
     with pytest.raises(InputError, match="has no face 'S7'"):
         side_of(nodes, "SIDE")
+    with pytest.raises(InputError, match="there is no surface 'ROUND'"):
+        side_of(nodes, "ROUND")
     with pytest.raises(InputError, match=r"there is no set or surface 'TOPP'"):
         side_of(nodes, "TOPP")
 

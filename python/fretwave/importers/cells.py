@@ -30,6 +30,8 @@ SOLIDS = {
     15: "quadratic_wedge",
     20: "quadratic_hexahedron",
 }
+#: In place of a face: the faces of another surface.
+ALL_OF = "*"
 _SHELLS = {3: "triangle", 4: "quadrilateral"}
 #: Places of the deck's nodes in VTK's order, where it is another.
 _TO_VTK = {"wedge": [3, 4, 5, 0, 1, 2], "quadratic_wedge": [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, 12, 13, 14]}
@@ -126,6 +128,11 @@ class Elements:
             first, _, face = text.partition(",")
             lines.append((first.strip().upper(), face.strip().strip(",").upper()))
 
+    def unite(self, name: str, data: Lines) -> None:
+        """The lines of a ``*SURFACE, COMBINE=UNION``: names of others, which may come later."""
+        names = [word.strip().upper() for _, text in data for word in text.split(",") if word.strip()]
+        self.surfaces.setdefault(name.upper(), []).extend((one, ALL_OF) for one in names)
+
     def vtk(self) -> dict[str, IntArray]:
         """Node numbers (n, m) in VTK's order by kind, cells in the order of their numbers."""
         ordered = {kind: block.nodes[np.argsort(block.numbers)] for kind, block in self.blocks.items()}
@@ -160,10 +167,16 @@ class Elements:
             measured, fix = int(different[np.argmax(count)]), "number the elements through"
             raise InputError("an element number stands twice", where, measured, "each element once", fix)
 
-    def faces(self, name: str, where: str) -> list[IntArray]:
+    def faces(self, name: str, where: str, above: tuple[str, ...] = ()) -> list[IntArray]:
         """Node numbers (n_faces, m) of the faces of a surface, each once, seen from outside, by kind of face."""
+        if name not in self.surfaces or name in above:
+            fix = nearest(name, list(self.surfaces)) or "check the name"
+            raise InputError(f"there is no surface '{name}'", where, None, ", ".join(sorted(self.surfaces)), fix)
         found = []
         for first, face in self.surfaces[name]:
+            if face == ALL_OF:
+                found += self.faces(first, f"{where}, surface {name}", (*above, name))
+                continue
             numbers = np.array([int(first)]) if first.isdigit() else self.members(first, where)
             self._check_there(numbers, f"{where}, surface {name}")
             for kind, block in self.blocks.items():

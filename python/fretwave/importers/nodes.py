@@ -227,6 +227,11 @@ class Deck:
         if options.get("TYPE", "ELEMENT").upper() == "NODE":
             lines = [(line, text.partition(",")[0]) for line, text in data]  # without the areas that may follow
             self._add_set(self.surfaces, "NAME", options, lines)
+        elif (how := options.get("COMBINE", "UNION").upper()) != "UNION":
+            what, fix = "a surface is no union of others", "name the faces of its elements"
+            raise InputError(what, self.where, f"*SURFACE, COMBINE={how}", "COMBINE=UNION", fix)
+        elif "COMBINE" in options:
+            self.elements.unite(options.get("NAME", ""), data)
         else:
             self.elements.add_surface(options.get("NAME", ""), data)
 
