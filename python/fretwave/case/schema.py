@@ -243,7 +243,9 @@ class ContactSection(BaseModel):
 class MaterialSection(Section):
     """``[material]``: what stress and its limit follow from in `fretwave stress`; nothing of it is solved with."""
 
-    youngs_modulus: Optional[Positive] = key("of all solid cells", "pressure", "210e9", default=None)
+    youngs_modulus: Optional[Positive] = key(
+        "of all solid cells; `fretwave stress` says where the stiffness has another", "pressure", "210e9", default=None
+    )
     poisson_ratio: Optional[float] = key("of all solid cells", "-", "0.3", default=None, gt=-1, lt=0.5)
     endurance_limit: Optional[Positive] = key(
         "stress amplitude that is borne for ever without mean stress", "pressure", "250e6", default=None

@@ -56,8 +56,7 @@ def _write_limits(path: Path, table: StressTable) -> None:
 def lines(table: StressTable) -> Iterator[str]:
     """What a reader asks for first."""
     known = {column.name: column for column in table.columns}
-    if table.note:
-        yield table.note
+    yield from table.notes
     for name in known:
         if name.endswith("_strain") and len(table.rows):
             yield _of_gauge(table, name, known[amplitude_column(known)])

@@ -79,6 +79,25 @@ _BEST: dict[str, tuple[Array, Powers]] = {
     **{kind: (_CUBE, _OF_NODES["hexahedron"]) for kind in PLACES if kind.endswith("hexahedron")},
 }
 
+#: Volume of each kind of cell in its own coordinates.
+_VOLUMES = {"tetrahedron": 1 / 6, "wedge": 1.0, "hexahedron": 8.0}
+#: Points of Gauss between -1 and 1, and their lengths.
+_THREE = list(zip((-np.sqrt(0.6), 0.0, np.sqrt(0.6)), (5 / 9, 8 / 9, 5 / 9)))
+_CUBE_OF_THREE = list(product(_THREE, repeat=3))
+_FULL = {
+    **{
+        kind: (
+            np.array([[u for u, _ in point] for point in _CUBE_OF_THREE]),
+            np.array([np.prod([size for _, size in point]) for point in _CUBE_OF_THREE]),
+        )
+        for kind in ("quadratic_hexahedron", "triquadratic_hexahedron")
+    },
+    "quadratic_wedge": (
+        np.array([(*place, z) for place in _SIXTH for z, _ in _THREE]),
+        np.array([size / 6 for _ in _SIXTH for _, size in _THREE]),
+    ),
+}
+
 
 def polynomials(powers: Powers, u: Array) -> tuple[Array, Array]:
     """Products of powers of the coordinates at u (n, d): values (n, k) and derivatives (n, d, k)."""
@@ -102,6 +121,19 @@ def shape_functions(kind: str, u: Array) -> tuple[Array, Array]:
 def best_points(kind: str) -> Array:
     """(n_points, 3) at which strain is best."""
     return _BEST["hexahedron" if kind == MODES else kind][0]
+
+
+def points_of_integration(kind: str, full: bool = False) -> tuple[Array, Array]:
+    """Places (n_points, 3) and volumes (n_points,) in a cell's own coordinates: `best_points`, or enough for its K.
+
+    Full integration of hexahedra of 20 and 27 nodes has 3 x 3 x 3 points, of quadratic wedges 3 over the height;
+    that of other kinds has the best points.
+    """
+    points = best_points(kind)
+    volume = next(volume for name, volume in _VOLUMES.items() if kind.endswith(name))
+    if not full or kind not in _FULL:
+        return points, np.full(len(points), volume / len(points))
+    return _FULL[kind]
 
 
 def extrapolation(kind: str) -> Array:

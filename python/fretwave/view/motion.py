@@ -28,9 +28,11 @@ from .expansion import Expand, beyond_basis, expansion_of
 from .geometry import geometry
 from .options import natural_scale
 
-#: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free,
-#: and the share (n,) of the static loads in each.
-ToNodes = Callable[[Array, Array], Array]
+#: Motion (n_dof, n) of all the model's dofs, both faces of a sector free, from columns (n_solved, n) on those that are
+#: solved, and the share (n,) of the static loads in each.
+ToDofs = Callable[[Array, Array], Array]
+#: Displacements (n_nodes, 3, n) of all nodes from that.
+ToNodes = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,7 @@ class Scene:
 
     nodes: Array
     choice: Choice
+    to_dofs: ToDofs
     to_nodes: ToNodes
     sectors: Sequence[int]
     ties: Parts | None = None
@@ -115,15 +118,19 @@ class Scene:
 
     def _expanded(self, sector: int) -> Array:
         """Nodal columns (n_nodes, 3, 1 + n_points m): at rest, then the coefficients of every point."""
+        return self.to_nodes(self.on_dofs(sector))
+
+    def on_dofs(self, sector: int) -> Array:
+        """The same on the model's dofs (n_dof, 1 + n_points m), in the sector's own frame."""
         if self.ties is None:
-            return self.to_nodes(self._columns(0), self._loaded())
+            return self.to_dofs(self._columns(0), self._loaded())
         total: Any = 0
         for k, T in self.ties.items():
             if self.choice.wheel:
                 total = total + T @ self._columns((sector + k) % self.around)
             else:
                 total = total + T @ self._delayed(self._columns(0), k)
-        return self.to_nodes(total, self._loaded())
+        return self.to_dofs(total, self._loaded())
 
     def _loaded(self) -> Array:
         """(1 + n_points m,) 1 where the static loads act: at rest, and in harmonic 0 of every point."""
@@ -180,8 +187,8 @@ def scene_of(
             expand, ties = basis.expand, basis.ties or ties
             beyond, note = beyond_basis(basis, _loads(case, choice))
         given, shown = moving or geometry(case), _shown(case, around, sectors)
-        to_nodes = _to_nodes(given, len(nodes), expand, beyond)
-        yield Scene(nodes, choice, to_nodes, shown, ties, around, given.axis or "z", note)
+        to_dofs, to_nodes = _to_dofs(expand, beyond), _to_nodes(given, len(nodes))
+        yield Scene(nodes, choice, to_dofs, to_nodes, shown, ties, around, given.axis or "z", note)
 
 
 def _loads(case: Case, choice: Choice) -> list[str]:
@@ -194,16 +201,24 @@ def _unchanged(columns: npt.ArrayLike) -> Array:
     return np.asarray(columns)
 
 
-def _to_nodes(given: Structure, n_nodes: int, expand: Expand, beyond: Array) -> ToNodes:
-    """Through the case's reduction and the builder's own.
+def _to_dofs(expand: Expand, beyond: Array) -> ToDofs:
+    """Through the case's reduction.
 
     Parameters
     ----------
     beyond : (n_dof,) static displacement under the loads that no reduced coordinate has, or (1,) zero [length]
     """
 
-    def displacements(columns: Array, loaded: Array) -> Array:
-        columns = expand(np.ascontiguousarray(columns)) + np.multiply.outer(beyond, loaded)
+    def motion(columns: Array, loaded: Array) -> Array:
+        return np.asarray(expand(np.ascontiguousarray(columns)) + np.multiply.outer(beyond, loaded))
+
+    return motion
+
+
+def _to_nodes(given: Structure, n_nodes: int) -> ToNodes:
+    """Through the builder's own reduction."""
+
+    def displacements(columns: Array) -> Array:
         if given.expansion is not None:
             columns = given.expansion @ columns
         if given.displacements is not None:  # held dofs, -1, read the row of zeros

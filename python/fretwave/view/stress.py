@@ -29,6 +29,7 @@ from ..post.largest import largest
 from ..results.parts import PARTS
 from ..results.results import open_results
 from ..texts import display
+from .agreement import Own
 from .choice import Choice, analyses_that_move, analysis_name, at_point, read_choice
 from .geometry import geometry
 from .inner_nodes import with_inner_nodes
@@ -53,12 +54,12 @@ GOODMAN = Column("goodman", "1", "Goodman's factor there: amplitude / endurance 
 
 @dataclass(frozen=True)
 class StressTable:
-    """Of one analysis: a row for each point, and a note on what they lack; empty for nothing."""
+    """Of one analysis: a row for each point, and notes on what they lack and whether the stress is the model's own."""
 
     name: str
     columns: list[Column]
     rows: list[dict[str, Any]]
-    note: str = ""
+    notes: Sequence[str] = ()
 
     def __getitem__(self, column: str) -> Array:
         """(n_points,)"""
@@ -75,23 +76,27 @@ class Reader:
     Attributes
     ----------
     structure : the model with the inner nodes of its cells
+    own : the model's stiffness, to compare; None where the material is not known
     strain : of all nodes
     at_gauges : of the gauges
     """
 
     gauges: Gauges
     structure: Structure
+    own: Own | None
     strain: StrainRows
     at_gauges: StrainRows
 
     @classmethod
-    def of(cls, gauges: Gauges, meshed: Structure, where: str) -> Reader:
+    def of(cls, gauges: Gauges, case: Case) -> Reader:
         """Of a model with solid cells."""
-        structure = with_inner_nodes(meshed, where)
+        meshed = geometry(case)
+        structure = with_inner_nodes(meshed, display(case.path))
+        own = Own.of(case, structure, gauges.elastic) if gauges.elastic else None
         strain = nodal_strain(np.asarray(structure.coordinates), solids_of(structure))
         weights = weights_of(gauges.gauges, meshed)
         weights.resize(len(gauges.gauges), strain.gradient.shape[1])
-        return cls(gauges, structure, strain, strain.mean(weights))
+        return cls(gauges, structure, own, strain, strain.mean(weights))
 
     def strains(self, labels: Sequence[str], motion: Array) -> Iterator[dict[str, float]]:
         """Amplitude and mean of each gauge, by the names of its columns, from (n_nodes, 3, m) [length]."""
@@ -137,7 +142,7 @@ def stress_tables(folder: Path, asked: str | None = None) -> Iterator[StressTabl
     """
     learn_kept_laws(folder)
     case, _ = reload_case(folder, kept=True)
-    reader = Reader.of(_gauges(case), geometry(case), display(case.path))
+    reader = Reader.of(_gauges(case), case)
     with open_results(folder / "results.h5") as file:
         found = [analysis_name(file, folder, case, asked)]
         for name in found if asked else _with_amplitudes(file, analyses_that_move(file, case)):
@@ -185,8 +190,12 @@ def _table(file: h5py.File, folder: Path, case: Case, name: str, reader: Reader)
             {**{key: points[key][k].item() for key in lead}, **_row(reader, scene, at_point(choice, group, case, k))}
             for k in range(len(group["coefficients"]))
         ]
+        notes = [scene.note] * bool(scene.note)
+        if rows and reader.own is not None:
+            k = largest(_sizes(rows), EQUAL)
+            notes += _agreement(reader.own, replace(scene, choice=at_point(choice, group, case, k)), rows[k])
     columns = [*_lead_columns(group, lead), *reader.columns(choice.wheel)]
-    return StressTable(name, [column.in_units(choice.units) for column in columns], rows, scene.note)
+    return StressTable(name, [column.in_units(choice.units) for column in columns], rows, notes)
 
 
 def _lead_columns(group: h5py.Group, names: Sequence[str]) -> Iterator[Column]:
@@ -207,8 +216,18 @@ def _row(reader: Reader, scene: Scene, choice: Choice) -> dict[str, Any]:
         worst.append({**reader.worst(labels, motion), **({"worst_sector": sector} if choice.wheel else {})})
         for gauge, read in zip(reader.gauges.gauges, reader.strains(labels, motion)):
             strains.update(read if not choice.wheel or gauge.sector == sector else {})
-    sizes = [float(one.get("goodman", one.get("stress_amplitude", 0.0))) for one in worst]
-    return {**strains, **worst[largest(np.array(sizes), EQUAL)]}
+    return {**strains, **worst[largest(_sizes(worst), EQUAL)]}
+
+
+def _sizes(rows: Sequence[Mapping[str, Any]]) -> Array:
+    """(n,) Goodman's factors, or stress amplitudes."""
+    return np.array([float(one.get("goodman", one.get("stress_amplitude", 0.0))) for one in rows])
+
+
+def _agreement(own: Own, scene: Scene, row: Mapping[str, Any]) -> list[str]:
+    """Of the motion that a row is of, in its worst sector."""
+    motion = scene.on_dofs(row.get("worst_sector", 0))
+    return list(own.compare(scene.choice.labels, motion, scene.to_nodes(motion), row["worst_node"]))
 
 
 def _motion(scene: Scene, sector: int) -> tuple[list[str], Array]:
