@@ -15,7 +15,7 @@ from test_built import BUILDER, TEXT
 from test_resume import command, kill_at, without_time
 from tolerances import LAST_DIGITS, REPEATED, ROUNDING
 
-from fretwave.analyses.wear import _advice
+from fretwave.analyses.wear import march_advice
 from fretwave.case.load import load_case
 from fretwave.commands.main import main
 from fretwave.errors import CaseErrors
@@ -301,7 +301,7 @@ def test_what_is_advised_after_a_march_can_be_set(tmp_path: Path, reason: str) -
     """It was `wear.step.minimum`, a key of modes."""
     (tmp_path / "model.py").write_text(BUILDER.read_text())
     (tmp_path / "case.toml").write_text(TEXT + WEAR)
-    settings = re.findall(r"--set '?([\w.]+)=(\S+?)[,)' ]", _advice("wear", reason))
+    settings = re.findall(r"--set '?([\w.]+)=(\S+?)[,)' ]", march_advice("wear", reason))
     assert settings
     for name, value in settings:
         load_case(tmp_path / "case.toml", [f"{name}={value if value[0] != '[' else '[1e-6]'}"])

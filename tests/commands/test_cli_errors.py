@@ -13,7 +13,7 @@ import pytest
 
 from fretwave._core import tuned_constants
 from fretwave.commands.main import main
-from fretwave.run.stopped import _advice
+from fretwave.run.stopped import advice
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -227,14 +227,14 @@ def test_not_converged_keeps_what_was_found(tmp_path: Path, capfd) -> None:
 
 
 def test_what_is_advised_after_a_loop_can_be_set(capfd) -> None:
-    settings = re.findall(r"--set \S+=[\d.]+", _advice("mode", "the branch is a closed loop: it comes back to 2"))
+    settings = re.findall(r"--set \S+=[\d.]+", advice("mode", "the branch is a closed loop: it comes back to 2"))
     assert main(["check", str(CASE), "--no-solve", *" ".join(settings).split()]) == 0
     assert len(settings) == 2
 
 
 @pytest.mark.parametrize("reason", ["step too small: DIVERGED_MAX_IT", "the branch comes back to amplitude 2, where"])
 def test_steps_that_pass_over_loops_can_be_asked_for(reason) -> None:
-    option = re.search(r"--petsc '-(fw_\w+) 1e300'", _advice("mode", reason))
+    option = re.search(r"--petsc '-(fw_\w+) 1e300'", advice("mode", reason))
     assert option and option[1] in {name for name, _, _ in tuned_constants()}
 
 

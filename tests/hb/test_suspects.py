@@ -11,7 +11,7 @@ from test_krylov import ROOT, TIP, beam, root_map
 
 import fretwave as fw
 from fretwave.hb.suspects import TOO_SMALL, lossless, suspects, vanishing
-from fretwave.run.stopped import _advice
+from fretwave.run.stopped import advice
 from fretwave.solve.preload import static_preload
 from fretwave.units import MM_T_S
 
@@ -76,7 +76,7 @@ def test_a_mode_that_leads_over_into_another_one_is_advised_to_be_damped(comm):
     branch = stopped(comm, 0.0)
     said = lossless(branch.problem, branch.anchor)
     assert "comes back to" in branch.reason and "loses no energy" in said
-    assert "damping.zeta=1e-2" in _advice("mode", branch.reason + said)
+    assert "damping.zeta=1e-2" in advice("mode", branch.reason + said)
     damped = stopped(comm, 1e-2)
     assert damped.converged, damped.reason
     assert lossless(damped.problem, damped.anchor) == ""

@@ -10,6 +10,7 @@ import pytest
 
 from fretwave.files.csv_table import write_rows
 from fretwave.results.study_report import markdown
+from fretwave.run.study import what_helps
 from fretwave.run.study_outcomes import Outcome, ResponseOutcome
 from fretwave.run.study_plan import Plan, Settings, Study, common_amplitudes
 
@@ -96,6 +97,14 @@ def test_a_run_that_fails_is_named_and_the_others_are_kept():
 def test_without_the_finest_run_there_is_no_table():
     study, _ = run_study(lambda settings: "no" if settings == PLAN.reference else solve(settings))
     assert study.table() == []
+
+
+def test_what_others_finish_without_is_named_first():
+    """And options that a study does not take are given as those of the analysis."""
+    study, _ = run_study(lambda settings: "step too small" if settings.tolerance == 1e-10 else solve(settings))
+    helps = what_helps(study, "mode")
+    assert helps.startswith("a milder finest tolerance, with which other runs finish; or shorter steps")
+    assert "--set mode.petsc='-fw_branch_other 1e300'" in helps and "--petsc" not in helps
 
 
 def test_table_is_written_as_csv_and_as_markdown(tmp_path):

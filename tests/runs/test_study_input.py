@@ -116,3 +116,11 @@ def test_a_dof_that_does_not_move_is_no_truth(tmp_path: Path, capfd) -> None:
     assert study(tmp_path, "--analysis", "forced") == 2
     told = capfd.readouterr().err
     assert "what is observed does not move" in told and "forced.observe" in told
+
+
+def test_a_finest_run_that_stops_is_told_what_the_run_would_say(tmp_path: Path, capfd) -> None:
+    """A looser tolerance is of no use against a largest number of points."""
+    assert study(tmp_path, "--set", "mode.step.max_points=3") == 3
+    told = capfd.readouterr().err.rpartition("try:")[2]
+    assert "mode.step.max_points=20000" in told
+    assert "tolerance" not in told and "milder" not in told

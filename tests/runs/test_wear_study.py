@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -51,6 +52,17 @@ def test_a_sweep_without_its_finest_run_is_left_out():
     plan = filled(WearPlan(BASE, (1, 3), (1e-2, 1e-4)))
     del plan.outcomes[WearSettings(3, 1e-4, 0.2)]
     assert {row["sweep"] for row in plan.table()} == {"harmonics"}
+
+
+def test_a_bound_that_never_rules_is_said():
+    """Errors of exactly zero are no accuracy: the pressure ruled every step."""
+    plan = filled(WearPlan(BASE, (1, 3), (1e-1, 1e-2, 1e-3)))
+    assert list(plan.without_effect()) == []
+    same = plan.outcomes[WearSettings(3, 1e-3, 0.2)]
+    plan.outcomes[WearSettings(3, 1e-2, 0.2)] = replace(same, wall_s=7.0)
+    (said,) = plan.without_effect()
+    assert said.startswith("With tolerance = 0.01 all steps are those of the finest run, as pressure_change = 0.2")
+    assert "--pressure-change" in said
 
 
 def test_table_and_picture(tmp_path):
@@ -122,3 +134,13 @@ def test_a_run_without_a_start_is_told_in_one_line(tmp_path, capfd):
     told = capfd.readouterr()
     assert "reaches none of the amplitudes of wear: the mode ends early" in told.out
     assert "milder finest settings" in told.err and told.err.count("try:") == 1
+
+
+def test_a_march_that_is_cut_is_told_what_the_run_would_say(tmp_path, capfd):
+    """Milder settings are of no use against a largest number of points."""
+    path = write_case(tmp_path)
+    arguments = ["--analysis", "wear", "--set", "wear.max_points=2", "--repeats", "1", "--out", tmp_path / "study"]
+    assert call("study", path, *arguments, "--tolerance", "1e-2,1e-3") == 3
+    told = capfd.readouterr().err
+    assert "wear.max_points=20000" in told.rpartition("try:")[2]
+    assert told.count("largest number of points") == 1

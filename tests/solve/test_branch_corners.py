@@ -11,7 +11,7 @@ from models.followed import follow, named, stop
 from tolerances import SOLVED
 
 import fretwave as fw
-from fretwave.run.stopped import _advice
+from fretwave.run.stopped import advice
 
 CIRCLING = "the branch turns in circles between corners at amplitude "
 ROUND = np.array([[4.48768243, -2.13970772], [-2.13970772, 3.19642204]])
@@ -158,4 +158,4 @@ def test_a_branch_that_goes_round_in_circles_ends(comm):
             branches.append(zigzag(comm, 0.0657))
     for branch, points in branches:
         assert branch.reason.startswith(CIRCLING) and len(points) < 500
-        assert "shorter steps" in _advice("mode", branch.reason)
+        assert "shorter steps" in advice("mode", branch.reason)

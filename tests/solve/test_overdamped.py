@@ -14,7 +14,7 @@ from tolerances import TIGHT
 
 import fretwave as fw
 from fretwave.analyses.parts.branch import suspected
-from fretwave.run.stopped import _advice
+from fretwave.run.stopped import advice
 from fretwave.units import SI
 
 LIMIT, EPS = 1.0, 0.1
@@ -53,7 +53,7 @@ def test_where_no_mode_oscillates_it_is_said_and_from_where_one_does(comm, times
     assert not list(found) and not found.converged
     assert found.anchor is None
     assert f"to {FIRST:.3g}: step too small" in found.reason
-    assert "damped less" in _advice("mode", found.reason)
+    assert "damped less" in advice("mode", found.reason)
 
 
 def test_branch_ends_where_its_motion_stops_to_oscillate(comm):

@@ -215,12 +215,12 @@ def _collect(
     if writer.rows:
         context.afterwards.append(lambda: shutil.rmtree(folder, ignore_errors=True))
     goal = f"{analysis.cycles:g} normalised cycles at every amplitude, or wear that stops"
-    advice = _advice(context.name, reason) if failures else ""
+    advice = march_advice(context.name, reason) if failures else ""
     summary = [line for result in marched for line in (result["summary"], *result["missed"])]
     return Outcome(writer.rows, reason, not failures, summary, goal, advice)
 
 
-def _advice(name: str, reason: str) -> str:
+def march_advice(name: str, reason: str) -> str:
     """What helps a march that stopped before its goal."""
     if TOO_MANY in reason:
         return f"--set {name}.max_points=20000, a larger `tolerance` or `pressure_change`, or fewer cycles"

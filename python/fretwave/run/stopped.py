@@ -21,7 +21,7 @@ def not_converged(name: str, outcome: Outcome) -> NotConverged:
         where=f"analysis '{name}', {place}",
         measured=outcome.reason,
         expected=outcome.goal or None,
-        fix=outcome.advice or _advice(name, outcome.reason),
+        fix=outcome.advice or advice(name, outcome.reason),
     )
 
 
@@ -31,7 +31,7 @@ def without(name: str, needed: str) -> Outcome:
     return Outcome(0, reason, False, [f"{name}: {reason}"], goal, advice=f"what lets '{needed}' begin")
 
 
-def _advice(name: str, reason: str) -> str:
+def advice(name: str, reason: str) -> str:
     """What most often helps against a reason to stop."""
     if "number of points" in reason:
         return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"

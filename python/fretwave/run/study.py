@@ -15,6 +15,7 @@ from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..results.runfolder import read_copy
 from ..results.study_report import LEGEND, LEGEND_OF_RESPONSE, PRINTED, PRINTED_OF_RESPONSE, markdown
+from .stopped import advice
 from .study_folder import StudyFolder, publish
 from .study_input import check_options, plan_of
 from .study_plan import Settings, Study
@@ -117,11 +118,20 @@ def _check_reference(study: Study, analysis: Studied) -> None:
             "the finest run of the study found no whole branch, so there is nothing to measure errors against",
             where=_text(finest),
             measured=study.failures[finest],
-            fix="choose a less strict finest setting, for example --tolerance 1e-4,1e-8",
+            fix=what_helps(study, analysis.name),
         )
     if study.outcomes[finest].unit == 0:
         what, fix = "what is observed does not move: no error can be measured in its amplitude", "observe another dof"
         raise InputError(what, f"{analysis.name}.observe", 0.0, "an amplitude above 0", fix)
+
+
+def what_helps(study: Study, name: str) -> str:
+    """Against what the finest run says of itself, or a setting of it that others do without."""
+    milder = [sweep.replace("_", " ") for sweep, settings in study.plan.sweeps() if settings in study.outcomes]
+    told = advice(name, study.failures[study.plan.reference]).replace("--petsc ", f"--set {name}.petsc=")
+    if not milder:
+        return told
+    return f"a milder finest {' or '.join(dict.fromkeys(milder))}, with which other runs finish; or {told}"
 
 
 def _analysis(case: Case, name: str | None) -> tuple[type[Solver[Any]], Studied]:

@@ -17,7 +17,7 @@ from ..analyses.parts.context import AnalysisContext
 from ..analyses.parts.rest import retained, start_mode
 from ..analyses.parts.wear_line import wear_areas
 from ..analyses.parts.wear_start import unworn_starts
-from ..analyses.wear import WearAnalysis
+from ..analyses.wear import WearAnalysis, march_advice
 from ..arrays import Array
 from ..case.build import model_of
 from ..case.load import Case
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 #: Swept where neither the command line nor the case says anything.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
+#: Of the two bounds on a step the other one.
+OTHER_BOUND = {"tolerance": "pressure_change", "pressure_change": "tolerance"}
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,29 @@ class WearPlan:
             if settings in self.outcomes and swept[-1] in self.outcomes
         ]
 
+    def without_effect(self) -> Iterator[str]:
+        """Sweeps in which runs take the finest one's steps to the last digit: their errors are zero, and none at all.
+
+        A step is as long as both the tolerance and the bound on pressure let it.
+        """
+        for name, swept in self.sweeps():
+            finest, other = self.outcomes.get(swept[-1]), OTHER_BOUND.get(name)
+            if finest is None or other is None:
+                continue
+            alike = [f"{getattr(one, name):g}" for one in swept[:-1] if _same(self.outcomes.get(one), finest)]
+            if alike:
+                ruling = f"{other} = {getattr(self.base, other):g}"
+                yield (
+                    f"With {name} = {', '.join(alike)} all steps are those of the finest run, as {ruling} rules them:"
+                    f" the errors are zero there because nothing changes. Sweep {other} too"
+                    f" (--{other.replace('_', '-')})."
+                )
+
+
+def _same(run: WearOutcome | None, finest: WearOutcome) -> bool:
+    """Whether a run differs in nothing but its time."""
+    return run is not None and replace(run, wall_s=finest.wall_s) == finest
+
 
 def _row(
     sweep: str,
@@ -148,8 +173,9 @@ def study_wear(case: Case, options: argparse.Namespace, comm: MPI.Comm, console:
         console.line(_progress(settings, found, case.units))
     solver.destroy()
     if not plan.table():
-        reasons = "; ".join(plan.failures.values())
-        raise NotConverged("no sweep has its finest run", None, reasons, "a finished march", "milder finest settings")
+        reasons = "; ".join(dict.fromkeys(plan.failures.values()))
+        fix = f"milder finest settings, or {march_advice(analysis.name, reasons)}"
+        raise NotConverged("no sweep has its finest run", None, reasons, "a finished march", fix)
     folder.finish(lambda path: _write(plan, amplitude, analysis, path, console))
     return EXIT_DONE
 
@@ -261,6 +287,7 @@ def _write(plan: WearPlan, amplitude: float, analysis: WearAnalysis, folder: Pat
         f" after {analysis.cycles:g} cycles."
     ]
     notes += [f"No whole march with {_text(settings)}: {reason}." for settings, reason in plan.failures.items()]
+    notes += list(plan.without_effect())
     publish(folder, {"study": rows}, markdown(rows, notes, PRINTED_OF_WEAR, LEGEND_OF_WEAR), console)
 
 
