@@ -154,3 +154,19 @@ def test_a_driven_wheel_keeps_the_state_at_rest_that_it_moves_about(tmp_path: Pa
     sector, wheel = (table(tmp_path / "run" / f"{name}_gauges.csv") for name in ("sector", "wheel"))
     for name in ("near_mean", "far_mean", "mean_stress", "near_strain", "stress_amplitude"):
         np.testing.assert_allclose(wheel[name], sector[name], rtol=1e-7)
+
+
+def test_a_run_that_lacks_the_state_at_rest_is_told(tmp_path: Path, capfd) -> None:
+    """Results of versions that did not keep it: what they lack is said, not shown in silence."""
+    shutil.copy(gauged_sector.__file__, tmp_path / "gauged_sector.py")
+    (tmp_path / "case.toml").write_text(CASE + LOADED + RESPONSE.format(name="wheel", wheel="true"))
+    assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    told = "note: the displacement at rest under spin is not kept"
+    for kept in (True, False):
+        capfd.readouterr()
+        assert call("stress", tmp_path / "run") == 0
+        assert call("view", tmp_path / "run", "--png", "--sectors", "0") == 0
+        assert capfd.readouterr().out.count(told) == (0 if kept else 2)
+        if kept:
+            with h5py.File(tmp_path / "run" / "results.h5", "r+") as file:
+                del file["wheel"]["rest_displacement"]

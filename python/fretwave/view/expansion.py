@@ -122,6 +122,18 @@ def beyond_basis(basis: Expansion, loads: Sequence[str]) -> tuple[Array, str]:
     return basis.beyond(known) if known else np.zeros(1), note if left else ""
 
 
+def without_rest(case: Case, choice: Choice) -> str:
+    """A note on a driven wheel about a preload whose state at rest an earlier version did not keep; else nothing."""
+    analysis = case.analyses[choice.name]
+    preload = case.preload_of(analysis)
+    if choice.loaded or not choice.wheel or analysis.type != "forced" or preload is None or not preload.loads:
+        return ""
+    return (
+        f"note: the displacement at rest under {', '.join(preload.loads)} is not kept: an earlier version made the run;"
+        " it counts as motion, and lacks what no component mode has; run it again for the exact one"
+    )
+
+
 def _check_model(case: Case, then: Array) -> None:
     """The model is that which was reduced: its motion is the run's own, its nodes are the case's."""
     now = marks_of(geometry(case))

@@ -24,7 +24,7 @@ from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
 from ..texts import display
 from .choice import Choice
-from .expansion import Expand, beyond_basis, expansion_of
+from .expansion import Expand, beyond_basis, expansion_of, without_rest
 from .geometry import geometry
 from .options import natural_scale
 
@@ -180,12 +180,13 @@ def scene_of(
     around = neighbours.sectors if neighbours else 1
     ties = neighbours.ties if neighbours else None
     expand: Expand = _unchanged
-    beyond, note = np.zeros(1), ""
+    beyond, note = np.zeros(1), without_rest(case, choice)
     with ExitStack() as stack:
         if case.reduction is not None:
             basis = expansion_of(case, choice, folder, around, stack)
             expand, ties = basis.expand, basis.ties or ties
-            beyond, note = beyond_basis(basis, _loads(case, choice))
+            beyond, missing = beyond_basis(basis, _loads(case, choice))
+            note = note or missing
         given, shown = moving or geometry(case), _shown(case, around, sectors)
         to_dofs, to_nodes = _to_dofs(expand, beyond), _to_nodes(given, len(nodes))
         yield Scene(nodes, choice, to_dofs, to_nodes, shown, ties, around, given.axis or "z", note)
