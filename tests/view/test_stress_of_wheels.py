@@ -57,12 +57,15 @@ wheel = {wheel}
 """
 
 
-def test_a_wave_and_the_whole_wheel_have_the_same_gauges(tmp_path: Path) -> None:
+def test_a_wave_and_the_whole_wheel_have_the_same_gauges(tmp_path: Path, capfd) -> None:
     shutil.copy(gauged_sector.__file__, tmp_path / "gauged_sector.py")
     text = CASE + MODE.format(name="wave", wheel="false") + MODE.format(name="whole", wheel="true")
     (tmp_path / "case.toml").write_text(text)
     assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    capfd.readouterr()
     assert call("stress", tmp_path / "run") == 0
+    printed = capfd.readouterr().out  # of the sector's own part of K, both faces as they move
+    assert printed.count("strain energy of the stress: 1.0000 of the model's own\n") == 2
     wave, whole = (table(tmp_path / "run" / f"{name}_gauges.csv") for name in ("wave", "whole"))
     assert set(whole) - set(wave) == {"worst_sector"}
     assert not whole["worst_sector"].any()  # all are equal: rounding chooses none
