@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import eigsh
 
 from fretwave import Pairs, Structure, fe
 
@@ -41,6 +44,7 @@ def build(
     bed: float = 0.0,
     known: int = 20,
     spin: float = 0.0,
+    modes: int = 0,
 ) -> Structure:
     """Held at x = 0; `tip` is the middle of the end along z.
 
@@ -50,6 +54,7 @@ def build(
     mount : stiffness of springs that hold all nodes of the end along z [N/mm]
     bed : stiffness of what every cell of the lower face lies on, of its nodes alone and together [N/mm]
     known : cells of the second half that the mesh keeps
+    modes : with which the builder itself reduces the model; 0 for none
     spin : share of K that 3000 rev/min add, as a part "spin"
     """
     parts = [half(order, first) for first in (True, False)]
@@ -77,7 +82,7 @@ def build(
     dof[free] = np.arange(len(free))
     tip_dof = int(dof[3 * tip + 2])
     K = K.tocsr()[free][:, free]
-    return Structure(
+    whole = Structure(
         M=M.tocsr()[free][:, free],
         K=K,
         dofs={"tip": tip_dof},
@@ -88,4 +93,21 @@ def build(
         node_numbers=np.arange(1, len(places) + 1),
         parts={"spin": spin * K / (100 * np.pi) ** 2} if spin else {},
         units="mm-t-s",
+    )
+    return by_modes(whole, modes) if modes else whole
+
+
+def by_modes(whole: Structure, count: int) -> Structure:
+    """On the displacement of the tip and all but the first of the lowest modes' coordinates."""
+    _, shapes = eigsh(whole.K, count, whole.M, sigma=0.0)
+    coordinates = np.eye(count)
+    coordinates[0] = shapes[whole.dofs["tip"]]
+    E = shapes @ np.linalg.inv(coordinates)
+    return replace(
+        whole,
+        M=sp.csr_matrix(E.T @ (whole.M @ E)),
+        K=sp.csr_matrix(E.T @ (whole.K @ E)),
+        dofs={"tip": 0},
+        pairs={"slider": Pairs(B=sp.csr_matrix(np.eye(count)[:1]), components=1)},
+        expansion=sp.csr_matrix(E),
     )

@@ -106,7 +106,7 @@ class Own:
             return f"warning: {told}: {reasons}" if reasons else told
         reason = MORE if ratio > 1 else LESS
         if self.constants is None:
-            return f"warning: {told}: {reason}; or [material] is not that of K"
+            return f"warning: {told}: [material] is not that of K, or {reason}"
         sure = ratio < 1 and not len(self.constants.wrong)  # the cells are K's, and it has something else beside them
         most = self._most(points, motion, displacement)
         return f"{'note' if sure else 'warning'}: {told}: {reason}; most at node {most}"
