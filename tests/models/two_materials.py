@@ -40,6 +40,7 @@ def build(
     moduli: tuple[float, float] = (210e3, 210e3),
     ratios: tuple[float, float] = (0.3, 0.3),
     retainer: float = 0.0,
+    strut: float = 0.0,
     mount: float = 0.0,
     bed: float = 0.0,
     known: int = 20,
@@ -51,6 +52,7 @@ def build(
     Parameters
     ----------
     retainer : stiffness across two nodes of the end that are not of one cell [N/mm]
+    strut : the same across two nodes of one cell [N/mm]
     mount : stiffness of springs that hold all nodes of the end along z [N/mm]
     bed : stiffness of what every cell of the lower face lies on, of its nodes alone and together [N/mm]
     known : cells of the second half that the mesh keeps
@@ -72,8 +74,10 @@ def build(
     end = np.flatnonzero(np.isclose(places[:, 0], LENGTH))
     tip = int(end[np.argmin(np.linalg.norm(places[end, 1:] - places[end, 1:].mean(axis=0), axis=1))])
     K = K + sp.diags(np.where(np.isin(np.arange(K.shape[0]), 3 * end + 2), mount, 0.0))
-    spread = sp.csr_matrix(([1.0, -1.0], ([0, 0], [3 * end[0] + 1, 3 * end[-1] + 1])), shape=(1, K.shape[0]))
-    K = K + retainer * (spread.T @ spread)
+    for stiffness, other in ((retainer, end[-1]), (strut, end[1])):
+        columns = [3 * end[0] + 1, 3 * other + 1]
+        spread = sp.csr_matrix(([1.0, -1.0], ([0, 0], columns)), shape=(1, K.shape[0]))
+        K = K + stiffness * (spread.T @ spread)
     for cell in np.concatenate(cells):
         below = cell[np.isclose(places[cell, 2], lower(places[cell]))]
         K = K + sp.kron(on_bed(below, len(places)), bed * np.diag([0, 0, 1.0])) if bed and len(below) else K

@@ -108,9 +108,10 @@ def test_two_materials_are_told_where_they_are(tmp_path: Path, capfd: pytest.Cap
     assert "the worst node too" not in text
 
 
-def test_springs_are_no_other_material(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("springs", ["mount = 1.0, retainer = 1e5", "mount = 1.0, strut = 1e5"])
+def test_springs_are_no_other_material(springs: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Of the end's nodes, to the ground and to each other: the stress of the cells is right, the rest is named."""
-    assert run(tmp_path, "options = { mount = 1.0, retainer = 1e5 }") == 0
+    assert run(tmp_path, f"options = {{ {springs} }}") == 0
     ratio, text = said(capfd)
     assert ratio < 0.9
     assert "warning" not in text

@@ -107,9 +107,9 @@ class Own:
         reason = MORE if ratio > 1 else LESS
         if self.constants is None:
             return f"warning: {told}: [material] is not that of K, or {reason}"
-        sure = ratio < 1 and not len(self.constants.wrong)  # the cells are K's, and it has something else beside them
+        kind = "note" if ratio < 1 else "warning"  # the cells are K's, and it has something else beside them
         most = self._most(points, motion, displacement)
-        return f"{'note' if sure else 'warning'}: {told}: {reason}; most at node {most}"
+        return f"{kind}: {told}: {reason}; most at node {most}"
 
     def _most(self, points: StressPoints, motion: Array, displacement: Array) -> int:
         """Number of the node at which the forces of K and of the stress differ most."""
@@ -169,7 +169,7 @@ MORE = (
     "the model's elements bend more softly than the strain of these cells says (reduced or selective integration,"
     " or modes that the matrices do not have), and have less stress than that told"
 )
-LESS = "K holds more than these cells: springs, shells, or cells that the mesh lacks"
+LESS = "K holds more than these cells: springs, shells, stress stiffness of a speed, or cells that the mesh lacks"
 
 
 def _moving(structure: Structure) -> npt.NDArray[np.bool_]:
