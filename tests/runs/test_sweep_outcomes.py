@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from command_line import call
 from models.swept_case import CASE
+from test_engine_order import TEXT
 from tolerances import SOLVED
 
 from fretwave.results.file import open_results
@@ -166,3 +167,22 @@ def test_a_sweep_of_branches_that_have_no_such_amplitude_has_its_picture(case: P
     assert call("sweep", case, *words) == 0
     assert "no picture" not in capsys.readouterr().out
     assert (tmp_path / "run" / "mode_summary.png").exists()
+
+
+@pytest.mark.parametrize("values", ["true,false", "false,true"])
+def test_values_whose_tables_have_other_columns_keep_all_of_theirs(tmp_path: Path, values: str) -> None:
+    """A wheel's branches beside those of one of its sectors: which comes first decides nothing."""
+    wheel = TEXT[: TEXT.index("[[analysis]]")] + MODAL.replace("{ mode = 1 }", '"disk"').replace("60.0", "0.2")
+    (tmp_path / "case.toml").write_text(wheel + "nodal_diameter = 2\n")
+    words = ["--over", f"modal.wheel={values}", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", tmp_path / "case.toml", *words) == 0
+    with open_results(tmp_path / "run" / "results.h5") as file:
+        points, numbers = file["modal/points"], file["modal/points/value"][()]
+        for number, wheel in enumerate(values.split(",")):
+            mine = file[f"modal/values/{number:04d}/points"]
+            assert ("participation" in mine) == (wheel == "true")
+            for name in (points.keys() | mine.keys()) - {"value", "modal.wheel"}:
+                here = points[name][()][numbers == number]
+                nothing = np.full(len(here), np.nan if here.dtype.kind == "f" else -1)
+                expected = mine[name][()] if name in mine else nothing
+                assert np.array_equal(here, expected, equal_nan=here.dtype.kind == "f")

@@ -5,6 +5,7 @@ A sweep over seeds (keys that end in `seed`) has a further table, ``<name>_quant
 ::
 
     <name>/points/...           one after the other, the branches of all values: `value`, the keys, then the columns
+                                of any of them: nan, -1 (whole numbers) or empty where a branch has no such column
     <name>/over/<key>           values of a key: dimension scale (n,)
     <name>/summary/<quantity>   (n_1, n_2, ..., [n_branches]), dimensions as in `over`, whose scales are here too: one
                                 group above they would hide the columns of their names in `points` from xarray.
@@ -217,15 +218,18 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
     numbers = np.repeat(np.array([branch.number for branch in branches], dtype="i8"), lengths)
     columns = [(Column(key, "", "swept key"), _key_column(plan, key)[numbers]) for key in plan.keys]
     columns.append((Column("value", "1", "number of the combination of values", "i"), numbers))
-    for key in branches[0].table if branches else ():
-        unit, long_name = branches[0].units[key]
-        columns.append(
-            (
-                Column(key, unit, long_name, units=branches[0].system),
-                np.concatenate([branch.table[key] for branch in branches]),
-            )
-        )
+    for key in table_order(dict.fromkeys(key for branch in branches for key in branch.table)):
+        first = next(branch for branch in branches if key in branch.table)
+        unit, long_name = first.units[key]
+        parts = [branch.table.get(key, _unknown(first.table[key], branch.points)) for branch in branches]
+        columns.append((Column(key, unit, long_name, units=first.system), np.concatenate(parts)))
     return columns
+
+
+def _unknown(like: Any, count: int) -> Any:
+    """A column (count,) of a branch that has no such quantity: nan, -1 of whole numbers, empty of texts."""
+    value = {"f": np.nan, "S": b""}.get(like.dtype.kind, -1)
+    return np.full(count, value, dtype=like.dtype)
 
 
 def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str, Any]]:
