@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import h5py
@@ -19,6 +20,7 @@ from fretwave.plots.linear_bands import bands, peaks
 from fretwave.post.engine_orders import crossing_speeds, excited_by, frequency_at, usual_orders
 from fretwave.report.report import report_run
 from fretwave.results.reader import Run
+from fretwave.results.stamp import stamp_of
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import run_case
 
@@ -160,11 +162,14 @@ def test_the_largest_damping_of_a_nonlinear_mode_is_marked_in_its_wave(solve):
     run = Run(out)
     top = int(np.argmax(run["mode"]["zeta"]))
     assert 0 < top < len(run["mode"]) - 1
-    (peak,) = peaks(run, bands(run["linear"]))
+    (peak,) = peaks(run, run["linear"], bands(run["linear"]))
     assert (peak.diameter, peak.speed, peak.hz) == (2, None, run["mode"]["frequency_hz"][top])
     ((_, figure),) = safe.figures(run)
     (star,) = [line for line in figure.axes[0].get_lines() if line.get_marker() == "*"]
     assert star.get_xydata().tolist() == [[2, peak.hz]]
+    stamp = stamp_of(run["mode"].attributes)
+    run["mode"].attributes["case"] = json.dumps({**stamp, "contact.between.friction_limit": 2.0})
+    assert not list(peaks(run, run["linear"], bands(run["linear"]))), "of the case before it changed"
 
 
 @pytest.mark.ranks(1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,10 @@ import h5py
 import pytest
 from command_line import call
 
+from fretwave.plots import backbone, forced
+from fretwave.report.report import report_text
+from fretwave.results.reader import Run
+from fretwave.results.stamp import of_one_model, stamp_of
 from fretwave.texts import display
 
 pytestmark = pytest.mark.ranks(1)
@@ -95,3 +100,49 @@ def test_the_same_case_changed_or_moved_is_no_other(folder: Path, tmp_path: Path
     assert call("run", CASE, *SHORT, "--out", folder) == 0
     moved = Path(shutil.copy(CASE, tmp_path / "moved.toml"))
     assert call("run", moved, *SHORT, "--out", folder) == 0
+
+
+@pytest.fixture(scope="module")
+def changed(tmp_path_factory) -> Path:
+    """A mode of the changed case beside what was found of the case as it was."""
+    path = tmp_path_factory.mktemp("changed") / "case.toml"
+    words = [*SHORT[:4], "-q", "--set", "mode.amplitude=[0.02,1.0]", "--set", "mode.report_at=[]"]
+    others = ["--set", "free_decay.amplitude=[0.8]", "--set", "forced.levels=[2.0]", "--set", "forced.time_points=0"]
+    path.write_text(CASE.read_text())
+    every = [*words[:3], "mode,mode_epmc,forced,free_decay", *words[4:], *others, "--out", path.parent / "run"]
+    assert call("run", path, *every) == 0
+    path.write_text(CASE.read_text().replace("friction_limit = 5.0", "friction_limit = 7.0"))
+    assert call("run", path, *words, *others, "--out", path.parent / "run") == 0
+    return path.parent / "run"
+
+
+def test_results_of_the_case_before_it_changed_are_told_apart(changed: Path, capsys) -> None:
+    assert call("show", changed) == 0
+    now = "contact.damper.friction_limit = 5.0 (now 7.0)"
+    said = f"mode_epmc, forced, free_decay: results of an earlier case, with {now}\n"
+    assert said in capsys.readouterr().out
+    assert call("show", changed, "--json") == 0
+    told = {one["name"]: one["changed"] for one in json.loads(capsys.readouterr().out)["analyses"]}
+    assert told["mode"] == "" and "friction_limit = 5.0" in told["forced"]
+    assert said.strip() in html.unescape(report_text(changed))
+
+
+def test_results_of_two_models_are_not_drawn_into_one_picture(changed: Path) -> None:
+    run = Run(changed)
+    assert not list(run.compared("free_decay"))
+    assert [name for name, _ in backbone.figures(run)] == ["mode_backbone", "mode_epmc_backbone"]
+    (figure,) = dict(forced.figures(run)).values()
+    names = [line.get_label() for line in figure.axes[0].lines]
+    assert "backbone, EPMC" in names and "backbone, CNM" not in names
+
+
+def test_what_is_solved_in_another_way_is_of_the_same_model(changed: Path) -> None:
+    """Other harmonics of the mode leave it beside its decay; dampers, which the decay has too, do not."""
+    run = Run(changed)
+    decay, mode = run["free_decay"], run["mode_epmc"]
+    stamp = stamp_of(decay.attributes)
+    own = {key: value for key, value in stamp.items() if key.startswith("mode.")}
+    for key, value, same in (("harmonics", 9, True), ("dampers", [{"dof": "m1", "c": 1.0}], False)):
+        assert f"mode.{key}" in own
+        mode.attributes["case"] = json.dumps({**stamp, f"mode.{key}": value})
+        assert of_one_model(decay, mode) is same

@@ -46,6 +46,9 @@ class TransientSection(AnalysisSection):
     def needs(self) -> list[str]:
         return [self.mode]
 
+    def decided_by(self) -> list[str]:
+        return [self.mode]
+
     def mode_of(self, case: Case) -> ModeAnalysis:
         """The mode that it starts from."""
         return case.analyses.of(ModeAnalysis)[self.mode]

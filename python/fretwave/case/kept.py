@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..results.file import has_results, open_results
 from ..results.runfolder import CASE_COPY, read_copy, read_record
+from ..results.stamp import COMMON
 from ..texts import display
 from .analysis import AnalysisSection
 from .load import Case, changed_keys, load_case
@@ -17,9 +18,6 @@ from .observed import label_of
 
 if TYPE_CHECKING:
     import h5py
-
-#: Tables of the case that decide the results of every analysis.
-COMMON = ("model", "contact", "reduction", "preload", "damping", "aerodynamics", "plugins")
 
 
 def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:

@@ -13,6 +13,7 @@ from ..arrays import AnyArray
 from ..post.mode_curve import NO_DAMPING, most_damped, varies, without_rounding
 from ..results.analysis import Analysis, Table
 from ..results.reader import Run
+from ..results.stamp import of_one_model
 from ..solve.table import Table as Reading
 from . import labels, marks, scales, style
 from .scales import Scale
@@ -246,6 +247,8 @@ def _shifted(run: Run, mode: Analysis) -> dict[str, Table]:
     tables = {}
     for motions, of in run.compared("limit_cycle"):
         for twin in run.of_kind("mode") if of is mode else ():
+            if not of_one_model(motions, twin):
+                continue
             table = run.table(f"{motions.name}_shifted_{twin.name}")
             if table is not None:
                 tables[twin.method()] = table
@@ -268,9 +271,10 @@ def _same_mode(modes: Sequence[Analysis]) -> list[list[Analysis]]:
 
 
 def _alike(one: Analysis, other: Analysis) -> bool:
-    """The same linear mode over the same amplitude, of a wheel in any sector."""
+    """The same linear mode of the same model over the same amplitude, of a wheel in any sector."""
     over = [mode.observed().partition("@")[0] for mode in (one, other)]
-    return over[0] == over[1] and _close(one.asymptote("stuck"), other.asymptote("stuck"))
+    same = over[0] == over[1] and _close(one.asymptote("stuck"), other.asymptote("stuck"))
+    return same and of_one_model(one, other)
 
 
 def _close(one: float | None, other: float | None) -> bool:

@@ -36,7 +36,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def draw(run: Run, linear: Analysis) -> Figure:
     """A panel for each of the waves that the engine orders excite nearest to the operating speed."""
     drawn = bands(linear)
-    found = list(peaks(run, drawn))
+    found = list(peaks(run, linear, drawn))
     waves = _nearest(linear, drawn)
     columns = min(len(waves), 2)
     rows = -(-len(waves) // columns)

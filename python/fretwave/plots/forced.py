@@ -14,6 +14,7 @@ from ..post.response_peaks import curve_length
 from ..results.analysis import Analysis, Table
 from ..results.overview import amplitude_column
 from ..results.reader import Run
+from ..results.stamp import of_one_model
 from . import marks, scales, style
 from .scales import Scale
 
@@ -24,6 +25,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     """One picture per forced analysis."""
     for forced in run.of_kind("forced"):
         modes = [run.analyses[name] for name in forced.backbones() if name in run.analyses]
+        modes = [mode for mode in modes if of_one_model(forced, mode)]
         tables = (run.table(f"{forced.name}_{suffix}") for suffix in ("time", "peaks"))
         yield f"{forced.name}_response", draw(forced, modes, *tables)
 

@@ -12,6 +12,7 @@ from ..arrays import AnyArray
 from ..post.engine_orders import frequency_at
 from ..results.analysis import Analysis, Table
 from ..results.reader import Run
+from ..results.stamp import of_one_model
 from . import style
 from .backbone import is_peak, peak_point
 
@@ -108,9 +109,9 @@ def highest(drawn: Sequence[Band]) -> float:
     return float(np.nanmax([np.nanmax([band.hz, band.other_hz]) for band in drawn]))
 
 
-def peaks(run: Run, drawn: Sequence[Band]) -> Iterator[Peak]:
-    """Of the nonlinear modes in the folder that are done and begin in one of the bands."""
-    for mode in run.of_kind("mode"):
+def peaks(run: Run, linear: Analysis, drawn: Sequence[Band]) -> Iterator[Peak]:
+    """Of the nonlinear modes of the same model in the folder that are done and begin in one of the bands."""
+    for mode in (mode for mode in run.of_kind("mode") if of_one_model(linear, mode)):
         stuck, diameter = mode.asymptote("stuck"), abs(int(mode.attributes.get("nodal_diameter", 0)))
         point = peak_point(mode)
         if stuck is None or mode.attributes.get("wheel") or mode.attributes.get("status") != "done":

@@ -43,7 +43,7 @@ def draw(run: Run, linear: Analysis) -> Figure:
     top = ABOVE * highest(drawn)
     if speed:
         _engine_orders(axes, sectors, speed, top)
-    for peak in (peak for peak in peaks(run, drawn) if peak.speed in (None, speed)):
+    for peak in (peak for peak in peaks(run, linear, drawn) if peak.speed in (None, speed)):
         axes.plot([peak.diameter], [peak.hz], **PEAK, label=PEAK_NAME)
     axes.set_xlim(-BESIDE * sectors / 2, (1 + BESIDE) * sectors / 2)
     axes.spines["left"].set_visible(False)  # engine orders are named there

@@ -6,6 +6,7 @@ import json
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from ..texts import counted
 from ..units import units_of
 from .file import OVERRIDES, open_results, unit_of_amplitudes
 from .record import RECORD, read_record
+from .stamp import changed_since, stamp_of
 
 if TYPE_CHECKING:
     import h5py
@@ -45,6 +47,7 @@ class Overview:
     limit_cycles : amplitude, frequency_hz, stable in its own amplitude (None: not known), nodal_diameter where there
         are several waves, fed (other linear modes that gain energy by themselves) of a stable one
     overrides : what the command line changed, as it was typed
+    changed : what the case of the last run has in another way, where these results are of an earlier one
     notes : what else is said, in lines
     """
 
@@ -62,6 +65,7 @@ class Overview:
     wall_s: float | None
     limit_cycles: list[dict[str, Any]] = field(default_factory=list)
     overrides: str = ""
+    changed: str = ""
     notes: list[str] = field(default_factory=list)
 
     def cells(self) -> tuple[str, ...]:
@@ -139,8 +143,8 @@ def _wave(cycle: Mapping[str, Any]) -> str:
     return f"nodal diameter {cycle['nodal_diameter']}, " if "nodal_diameter" in cycle else ""
 
 
-def overview_of(name: str, group: h5py.Group) -> Overview:
-    """Of an analysis' group of the results."""
+def overview_of(name: str, group: h5py.Group, resolved: Values = MappingProxyType({})) -> Overview:
+    """Of an analysis' group of the results; `resolved` is the case of the last run in its folder."""
     table, unit = {key: data[()] for key, data in group["points"].items()}, unit_of_amplitudes(group)
     attributes = group.attrs
     return Overview(
@@ -158,6 +162,7 @@ def overview_of(name: str, group: h5py.Group) -> Overview:
         wall_s=float(table["wall_s"].sum()) if "wall_s" in table else None,
         limit_cycles=json.loads(attributes.get("events", "[]")),
         overrides=str(attributes.get(OVERRIDES, "")),
+        changed=changed_since(stamp_of(attributes), resolved),
         notes=_landmarks(name, group),
     )
 
@@ -245,7 +250,8 @@ def overviews(folder: Path) -> tuple[str, list[Overview]]:
     """
     with open_results(folder / "results.h5") as file:
         names = [name for name in in_order(folder, list(file)) if "type" in file[name].attrs]
-        return str(file.attrs.get("title", "")), [overview_of(name, file[name]) for name in names]
+        resolved = recorded(folder).get("case", {}).get("resolved", {})
+        return str(file.attrs.get("title", "")), [overview_of(name, file[name], resolved) for name in names]
 
 
 def in_order(folder: Path, names: list[str]) -> list[str]:
@@ -273,9 +279,21 @@ def heading(folder: Path, title: str) -> list[str]:
 
 
 def overridden(found: list[Overview]) -> list[str]:
-    """What was not as in the case file; said once where it is the same for several analyses."""
-    changed: dict[str, list[str]] = {}
-    for one in found:
-        changed.setdefault(one.overrides, []).append(one.name)
-    every = len(changed) == 1 and len(found) > 1
-    return [f"{'all' if every else ', '.join(names)}: with {text}" for text, names in changed.items() if text]
+    """What was not as in the case file, or is not any more; said once where it is the same for several analyses."""
+    return [
+        f"{names}: {words} {text}"
+        for words, texts in (
+            ("with", {one.name: one.overrides for one in found}),
+            ("results of an earlier case, with", {one.name: one.changed for one in found}),
+        )
+        for text, names in _by_text(texts)
+    ]
+
+
+def _by_text(texts: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Each text with the names of the analyses that have it, or ``all``; not the empty one."""
+    found: dict[str, list[str]] = {}
+    for name, text in texts.items():
+        found.setdefault(text, []).append(name)
+    every = len(found) == 1 and len(texts) > 1
+    return [(text, "all" if every else ", ".join(names)) for text, names in found.items() if text]

@@ -13,6 +13,7 @@ from ..columns import name_of
 from ..errors import InputError
 from .analysis import Analysis, Table, read_analysis
 from .file import has_results, open_results
+from .stamp import of_one_model
 
 if TYPE_CHECKING:
     import h5py
@@ -101,10 +102,10 @@ class Run:
         return sorted(path.stem for path in self.folder.glob("*.csv"))
 
     def compared(self, kind: str) -> Iterator[tuple[Analysis, Analysis]]:
-        """Analyses of a type in the time domain, each with the mode it is compared with."""
+        """Analyses of a type in the time domain, each with the mode it is compared with, of the same model."""
         for analysis in self.of_kind(kind):
             mode = self.analyses.get(str(analysis.attributes.get("mode")))
-            if mode is not None and len(mode):
+            if mode is not None and len(mode) and of_one_model(analysis, mode):
                 yield analysis, mode
 
     def _attribute(self, name: str) -> Any:
