@@ -259,7 +259,10 @@ def test_steps_have_an_end(folder: Path, run: Path, tmp_path: Path, capsys) -> N
     assert main(arguments(folder, tmp_path, *words, "--set", "wear.pressure_change=1e-7")) == 3
     told = capsys.readouterr()
     assert "largest number of points" in told.err and "6 points are kept" in told.err
-    assert "--set wear.max_points=" in told.err and "report at 3 cycles: the march ended at" in told.out
+    assert (
+        "--set wear.max_points=" in told.err
+        and "missed: a = 2.1e-06 m: report at 3 cycles: the march ended at" in told.out
+    )
     table = rows(tmp_path)
     assert len(table) == 6 and float(table[-1]["cycles"]) > 0
     assert [row["event"] for row in table if row["event"]] == ["start", "report"]

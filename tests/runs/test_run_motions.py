@@ -80,6 +80,17 @@ def test_a_decay_onto_a_damper_that_creeps_ends_where_it_no_longer_swings(tmp_pa
     assert len(rows) < 40 and f"start 0: ends after {len(rows)} cycles: it no longer swings about zero" in said
 
 
+def test_what_a_decay_is_off_by_is_that_of_its_table(tmp_path: Path, capfd) -> None:
+    """Damping ratios of two percent: an absolute difference is a fiftieth of the relative one."""
+    said, rows = run(tmp_path, capfd, "free_decay", reach=[0.005, 0.1], c=5.0, eps=1.0, starts=[0.05], periods=14)
+    (told,) = [line for line in said if "where the damping changes slowly" in line]
+    far = [max(abs(row["omega"] / row["omega_mode"] - 1) for row in rows[1:-1])]
+    far += [max(abs(row["zeta"] - row["zeta_mode"]) for row in rows[1:-1])]
+    assert far[1] > 0
+    words = f"the mode's by up to {far[0]:.1e} (relative), the damping ratio by up to {far[1]:.1e} (absolute)"
+    assert told.endswith(words)
+
+
 def test_a_decay_without_a_full_cycle_is_told_in_words(tmp_path: Path, capfd) -> None:
     said, rows = run(tmp_path, capfd, "free_decay", reach=[0.02, 0.1], c=5.0, starts=[0.05], periods=3)
     assert not rows and "start 0: fewer than four full cycles" in said

@@ -123,5 +123,5 @@ def _comparison(count: int, omega: float, zeta: float) -> str:
         return f"{counted(count, 'full cycle')}, none that changes slowly where the mode is unique: nothing to compare"
     return (
         f"{counted(count, 'cycle')}; where the damping changes slowly the frequency differs "
-        f"from the mode's by up to {omega:.1e} (relative), the damping ratio by up to {zeta:.1e}"
+        f"from the mode's by up to {omega:.1e} (relative), the damping ratio by up to {zeta:.1e} (absolute)"
     )

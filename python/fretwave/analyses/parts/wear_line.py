@@ -222,12 +222,13 @@ class _Marcher:
             told += f"; errors are not estimated: {self.mode.errors_left_out}"
         self.writer.abandon()  # its journal stays until the common table is done: a resumed run finds the line there
         end, length = march.eta / self.unit, self.context.units("length")
+        place = f"a = {self.line.amplitude:g} {length}"
         return {
             "status": status,
             "reason": march.reason,
-            "summary": f"{self.context.name}: a = {self.line.amplitude:g} {length}: {self.writer.rows} points to"
+            "summary": f"{self.context.name}: {place}: {counted(self.writer.rows, 'point')} to"
             f" {end:.4g} normalised cycles, {march.reason}{told}",
-            "missed": [f"{self.context.name}: missed: {text}" for text in march.missed(self.unit)],
+            "missed": [f"{self.context.name}: missed: {place}: {text}" for text in march.missed(self.unit)],
             "labels": " ".join(self.problem.harmonics.labels),
             "samples": self.problem.harmonics.samples,
             "load_scale": march.load_scale,
