@@ -161,3 +161,20 @@ def test_resume_without_the_case_file_uses_the_copy(tmp_path: Path, launch) -> N
     assert launch(1, "-m", "fretwave", "run", str(case), "--out", str(folder), *SHORT).returncode == 0
     case.unlink()
     assert launch(1, "-m", "fretwave", "resume", str(folder)).returncode == 0
+
+
+def test_a_level_that_stopped_before_the_kill_is_not_forgotten(tmp_path: Path) -> None:
+    """The first of three grows without bound; the run is killed in the last one."""
+    text = ["--set", "forced.levels=[20.0, 2.0, 8.0]", "--set", "forced.backbone=[]"]
+    whole_run = command("run", str(CASE), "--out", str(tmp_path / "whole"), "--only", "forced", *OVERRIDES, *text)
+    told = subprocess.run(whole_run, check=False, capture_output=True, text=True)
+    assert told.returncode == 3 and "level 20: the response grows without bound" in told.stderr
+    cut = [str(tmp_path / "cut") if word == str(tmp_path / "whole") else word for word in whole_run]
+    late = sum(row["level"] != "8.0" for row in rows(tmp_path / "whole", "forced")) + 20
+    assert kill_at(cut, tmp_path / "cut" / "forced.csv", late) < len(rows(tmp_path / "whole", "forced"))
+    resumed = subprocess.run(command("resume", str(tmp_path / "cut")), check=False, capture_output=True, text=True)
+    assert resumed.returncode == 3 and resumed.stderr.splitlines()[2] == told.stderr.splitlines()[2]
+    with h5py.File(tmp_path / "whole" / "results.h5") as one, h5py.File(tmp_path / "cut" / "results.h5") as other:
+        for name, expected in (("status", "stopped"), ("ended", "[2.0, 8.0]")):
+            assert one["forced"].attrs[name] == other["forced"].attrs[name] == expected
+        assert one["forced"].attrs["reason"] == other["forced"].attrs["reason"]

@@ -36,6 +36,7 @@ from .parts.fed_modes import fed_modes
 from .parts.observed import named
 from .parts.others import with_others
 from .parts.rest import keep_pairs, rest_state, retained, start_mode, stuck_or_free
+from .parts.several import ending_of, stopped_before, with_stopped
 
 if TYPE_CHECKING:
     from ..case.facts import Facts
@@ -149,13 +150,13 @@ def _all_waves(
 ) -> Outcome:
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("wave_number", 0))
-    reasons = []
+    stopped = stopped_before(own)
     with context.console.progress(context.name):
         for number in range(first, len(diameters)):
             wave = _Wave(context, diameters, number, harmonics)
-            reasons.append(wave.follow(writer, snapshot, found and number == first))
-    stopped = [reason for reason in reasons if reason]
-    reason = "; ".join(stopped) or "stop value reached"
+            why = wave.follow(writer, snapshot, found and number == first, stopped)
+            stopped.update({number: why} if why else {})
+    status, reason, ended = ending_of(stopped, diameters)
     table = finished_table(writer)
     waves = context.comm.bcast(describe_waves(table, diameters) if table else [])
     for wave in waves:
@@ -164,7 +165,7 @@ def _all_waves(
     _write(context, waves, cycles)
     if table:
         keep_pairs(context, writer)
-    writer.close("stopped" if stopped else "done", reason, events=json.dumps(cycles), waves=json.dumps(waves))
+    writer.close(status, reason, events=json.dumps(cycles), waves=json.dumps(waves), **ended)
     context.entry["waves"] = waves
     unit = context.units("length")
     summary = [f"{context.name}: {words(wave, unit)}" for wave in waves]
@@ -213,8 +214,10 @@ class _Wave:
         self.diameter = diameters[number]
         self.analysis = context.analysis
 
-    def follow(self, writer: AnalysisWriter, snapshot: Optional[dict[str, Any]], go_on: bool) -> str:
-        """Write its points; returns why it stopped early, or nothing. Collective."""
+    def follow(
+        self, writer: AnalysisWriter, snapshot: Optional[dict[str, Any]], go_on: bool, earlier: Mapping[int, str]
+    ) -> str:
+        """Write its points, with what earlier waves stopped for; returns why it did, or nothing. Collective."""
         analysis = self.analysis
         with _in_wave(self.context, self.diameter) as own_context:
             problem = self._problem(own_context)
@@ -222,7 +225,7 @@ class _Wave:
             low, high = analysis.amplitude
             branch = continuation(own_context, problem, (low, high), analysis.report_at, snapshot, go_on, name)
             for point in points_of(branch):
-                own, now = {"wave_number": self.number}, branch.problem
+                own, now = with_stopped(earlier, wave_number=self.number), branch.problem
                 self._say(record(writer, now, point, branch.snapshot(), own, self._column, self.analysis.errors))
             tell(self.context, branch, name)
             stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
 import numpy as np
@@ -35,6 +36,7 @@ from .parts.excitation import Excitation, excitation_of, wave_of_forces
 from .parts.forced_peaks import curves_of, write_peaks
 from .parts.observed import keep_row, named
 from .parts.rest import keep_pairs, retained
+from .parts.several import ending_of, stopped_before, with_stopped
 from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
 
 if TYPE_CHECKING:
@@ -212,13 +214,13 @@ def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation
     analysis = context.analysis
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("level_number", 0))
-    reasons = []
+    stopped = stopped_before(own)
     with context.console.progress(context.name):
         for number in range(first, len(analysis.levels)):
             go_on = found and number == first
-            reasons.append(_one_level(excitation, writer, number, snapshot, go_on, own.get("phase")))
-    stopped = [reason for reason in reasons if reason]
-    reason = "; ".join(stopped) or "stop value reached"
+            why = _one_level(excitation, writer, number, snapshot, go_on, own.get("phase"), stopped)
+            stopped.update({number: why} if why else {})
+    status, reason, ended = ending_of(stopped, analysis.levels)
     table = finished_table(writer)
     wheel = context.case.wheel is not None and writer.rows > 0
     blades = blade_amplitudes(excitation, writer) if wheel and writer.active else None
@@ -226,7 +228,7 @@ def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation
     if table:
         keep_pairs(context, writer)
         keep_row(context, writer, analysis.observe, row)
-    writer.close("stopped" if stopped else "done", reason, events="[]")
+    writer.close(status, reason, events="[]", **ended)
     curves = curves_of(context, analysis.backbones())
     summary = (
         blade_by_blade(excitation, table, blades, curves)
@@ -253,8 +255,12 @@ def _one_level(
     snapshot: Optional[dict[str, Any]],
     go_on: bool,
     phase: Optional[float],
+    earlier: Mapping[int, str],
 ) -> str:
-    """Follow one response, on from a phase if it was begun; returns why it stopped early, or nothing. Collective."""
+    """Follow one response, on from a phase if it was begun; returns why it stopped early, or nothing. Collective.
+
+    What earlier levels stopped for is kept with its points.
+    """
     context, analysis = excitation.context, excitation.analysis
     low, high = (2.0 * math.pi * hertz for hertz in analysis.frequency)
     problem, units = excitation.problem(analysis.levels[number]), context.units
@@ -262,7 +268,8 @@ def _one_level(
     branch = excitation.branch(problem, snapshot, go_on)
     excitation.phase = phase if go_on else None
     for point in points_of(branch):
-        own = {"level_number": number, **({} if excitation.phase is None else {"phase": excitation.phase})}
+        phases = {} if excitation.phase is None else {"phase": excitation.phase}
+        own = with_stopped(earlier, level_number=number, **phases)
         now = branch.problem
         row = record(writer, now, point, branch.snapshot(), own, excitation.row, analysis.errors)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)

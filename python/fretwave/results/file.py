@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Attribute of an analysis: what the command line changed of the case, as it was typed.
 OVERRIDES = "command_line"
+#: Attribute of an analysis of several branches: levels or nodal diameters that came to their end, as JSON.
+ENDED = "ended"
 
 
 class NewResults:
