@@ -186,3 +186,26 @@ def test_values_whose_tables_have_other_columns_keep_all_of_theirs(tmp_path: Pat
                 nothing = np.full(len(here), np.nan if here.dtype.kind == "f" else -1)
                 expected = mine[name][()] if name in mine else nothing
                 assert np.array_equal(here, expected, equal_nan=here.dtype.kind == "f")
+
+
+def test_a_level_that_stopped_leaves_the_others_in_the_quantiles(tmp_path: Path, capsys) -> None:
+    """Below 4/pi times its limit a slider bounds a response at resonance: draws of low limits stop at level 2 alone."""
+    text = CASE[: CASE.index("[[analysis]]")].replace("[model]", "[uncertainty]\nvalues.LIMIT = DRAWN\n[model]")
+    spread = '{ distribution = "uniform", low = 0.5, high = 3.5 }'
+    forced = "harmonics = 1\nsamples = 128\nforce = { x = 1.0 }\nlevels = [0.5, 2.0]\nfrequency = [0.14, 0.24]\n"
+    forced = f'[[analysis]]\nname = "forced"\ntype = "forced"\n{forced}observe = "x"\n'
+    text = text.replace("LIMIT", LIMITS.rstrip("=")).replace("DRAWN", spread) + forced
+    (tmp_path / "case.toml").write_text(text)
+    words = ["--over", "uncertainty.seed=1:8", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", tmp_path / "case.toml", *words) == 3
+    found = rows(tmp_path / "run" / "summary.csv")
+    limits = {row["uncertainty.seed"]: float(row[LIMITS.rstrip("=")]) for row in found}
+    bounded = {seed for seed, limit in limits.items() if 4 / np.pi * limit > 2.0}
+    assert 0 < len(bounded) < len(limits)
+    assert {row["uncertainty.seed"] for row in found if (row["level"], row["done"]) == ("2.0", "1")} == bounded
+    assert all(row["done"] == "1" for row in found if row["level"] == "0.5")
+    table = rows(tmp_path / "run" / "forced_quantiles.csv")
+    counts = {(row["level"], row["n"]) for row in table if row["quantity"] == "largest_amplitude"}
+    assert counts == {("0.5", "8"), ("2.0", str(len(bounded)))}
+    said = [f"seed = {seed} (level 2)" for seed in limits if seed not in bounded]
+    assert f"{len(said)} of 8 values: {'; '.join(said)}" in capsys.readouterr().out

@@ -102,8 +102,7 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
     if lines:
         lines.append(f"{name}: in brackets the {100 * CONFIDENCE:g} % confidence intervals of the quantiles")
-    done = {row["value"] for row in rows if row.get("done", 1) == 1}
-    bad = [label for number, label in enumerate(plan.labels()) if number not in done]
+    bad = _left_out(plan, rows, split)
     if bad:
         shown = "; ".join(bad[:10]) + ("; ..." if bad[10:] else "")
         lines.append(f"{name}: left out, for they failed or stopped early: {len(bad)} of {len(plan)} values: {shown}")
@@ -113,6 +112,18 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         for q, n in short.items()
     ]
     return lines
+
+
+def _left_out(plan: Plan, rows: Sequence[Row], split: str) -> list[str]:
+    """Values that failed or stopped early, in words; with the levels or nodal diameters where it is some of them."""
+    parts, found = parts_in(rows, split), list[str]()
+    done = {(row["value"], row.get(split)) for row in rows if row.get("done", 1) == 1}
+    for number, label in enumerate(plan.labels()):
+        missing = [part for part in parts if (number, part) not in done]
+        some = [] if len(missing) == len(parts) else [f"{part:g}" for part in missing]
+        which = f" ({split.replace('_', ' ')} {', '.join(some)})" if some else ""
+        found += [f"{label}{which}"] if missing else []
+    return found
 
 
 def reported_at(name: str, rows: Sequence[Row]) -> str:

@@ -30,6 +30,7 @@ from ..files.dimensions import name_dimensions
 from ..post.grid import Plan
 from ..texts import toml
 from ..units import ATTRIBUTE, SI, UnitSystem, units_of
+from .file import ENDED
 from .results import has_results, open_results, rewritten
 from .sweep_quantiles import over_seeds, quantile_lines, quantile_rows
 from .sweep_summary import COMMON, columns_in, landmarks, split_of, spread_of, summarise, summary_of
@@ -250,7 +251,14 @@ def parts_of(kind: str, branch: Branch) -> Iterator[tuple[dict[str, Any], dict[s
         chosen = np.full(branch.points, True) if part is None else column == part
         table = {key: values[chosen] for key, values in branch.table.items()}
         forces = branch.start_forces.get(int(np.argmax(chosen)), {})
-        yield {} if part is None else {split: part.item()}, summarise(kind, table, attributes, forces)
+        own = attributes if part is None else {**attributes, "status": _status(attributes, part)}
+        yield {} if part is None else {split: part.item()}, summarise(kind, table, own, forces)
+
+
+def _status(attributes: Mapping[str, Any], part: Any) -> str:
+    """Of one of the branches of an analysis: others that stopped early do not make it one that did."""
+    ended = part in json.loads(attributes.get(ENDED, "[]"))
+    return "done" if ended else str(attributes.get("status"))
 
 
 def _shared(branches: Sequence[Branch]) -> dict[str, Any]:
