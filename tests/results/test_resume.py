@@ -13,6 +13,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from command_line import call
+
+from fretwave.analyses.parts import forced_time
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -178,3 +181,12 @@ def test_a_level_that_stopped_before_the_kill_is_not_forgotten(tmp_path: Path) -
         for name, expected in (("status", "stopped"), ("ended", "[2.0, 8.0]")):
             assert one["forced"].attrs[name] == other["forced"].attrs[name] == expected
         assert one["forced"].attrs["reason"] == other["forced"].attrs["reason"]
+
+
+def test_what_came_after_the_branches_and_was_given_up_is_not_done_when_resumed(tmp_path: Path, monkeypatch) -> None:
+    """Integration that does not come to a steady motion stops a response whose levels are done."""
+    monkeypatch.setattr(forced_time, "time_points", lambda *_: ([], "too many steps"))
+    few = ["--set", "forced.backbone=[]", "--set", "forced.levels=[2.0]", "--set", "forced.time_points=1"]
+    words = ["--only", "forced", "--no-plots", "--quick", *few, "--out", tmp_path / "run"]
+    assert call("run", CASE, *words) == 3
+    assert call("resume", tmp_path / "run") == 3

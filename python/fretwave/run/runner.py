@@ -238,6 +238,7 @@ class Runner:
         status, entry = on_first_rank(self.comm, look), self.folder.record["analyses"].get(name)
         if status not in ENDED or entry is None:
             return False
+        status = str(entry["status"])  # that of the results says nothing of what came after the branches
         self.console.line(f"{name}: already {status}")
         if status == "stopped":
             self.failures.append(not_converged(name, Outcome(int(entry["points"]), str(entry["reason"]), False)))
