@@ -183,10 +183,14 @@ def test_a_level_that_stopped_before_the_kill_is_not_forgotten(tmp_path: Path) -
         assert one["forced"].attrs["reason"] == other["forced"].attrs["reason"]
 
 
-def test_what_came_after_the_branches_and_was_given_up_is_not_done_when_resumed(tmp_path: Path, monkeypatch) -> None:
+def test_what_came_after_the_branches_and_was_given_up_is_not_done_when_resumed(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
     """Integration that does not come to a steady motion stops a response whose levels are done."""
     monkeypatch.setattr(forced_time, "time_points", lambda *_: ([], "too many steps"))
     few = ["--set", "forced.backbone=[]", "--set", "forced.levels=[2.0]", "--set", "forced.time_points=1"]
     words = ["--only", "forced", "--no-plots", "--quick", *few, "--out", tmp_path / "run"]
     assert call("run", CASE, *words) == 3
+    said = capsys.readouterr().err
     assert call("resume", tmp_path / "run") == 3
+    assert capsys.readouterr().err == said and "forced.time_points=0" in said

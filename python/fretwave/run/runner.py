@@ -241,7 +241,9 @@ class Runner:
         status = str(entry["status"])  # that of the results says nothing of what came after the branches
         self.console.line(f"{name}: already {status}")
         if status == "stopped":
-            self.failures.append(not_converged(name, Outcome(int(entry["points"]), str(entry["reason"]), False)))
+            goal, advice = (str(entry.get(key, "")) for key in ("goal", "advice"))
+            outcome = Outcome(int(entry["points"]), str(entry["reason"]), False, goal=goal, advice=advice)
+            self.failures.append(not_converged(name, outcome))
         return True
 
     def _is_begun(self, name: str) -> bool:
@@ -305,12 +307,14 @@ class Runner:
         for line in outcome.summary:
             self.console.line(line)
         memory = peak_memory_mb(self.comm)
+        of_failure = {} if outcome.converged else {"goal": outcome.goal, "advice": outcome.advice}
         self.folder.record["analyses"][name] = {
             "status": "done" if outcome.converged else "stopped",
             "reason": outcome.reason,
             "points": outcome.points,
             "wall_s": round(seconds, 3),
             "peak_memory_mb": memory,
+            **of_failure,
             **(entry or {}),
         }
         on_first_rank(self.comm, self.folder.save)
