@@ -15,7 +15,7 @@ from ..case.observed import check_displaced
 from ..columns import Column
 from ..errors import InputError
 from ..post.decays import decay_rows, largest_differences
-from ..post.mode_curve import ModeCurve, at_the_end
+from ..post.mode_curve import at_the_end
 from ..solve.steps import COARSEST_TOLERANCE, TIME_TOLERANCE
 from ..texts import counted, toml
 from .mode import ModeAnalysis
@@ -104,7 +104,7 @@ class FreeDecayAnalysis(TransientSection):
         """Let the motion of the mode decay from each start; every cycle is compared with the mode. Collective."""
         from .parts.starts import FAR, Starts
 
-        mode = ModeCurve.from_table(context.table(self.mode))
+        mode = context.curve(self.mode)
         rows: list[dict[str, Any]] = []
         lines: list[str] = []
         with Starts(context, COLUMNS) as starts:

@@ -260,6 +260,15 @@ class Analysis:
         return ModeCurve.from_table(self.columns)
 
 
+def own_curve(group: h5py.Group, folder: Path) -> ModeCurve:
+    """Of the group of a mode in a run's results: as `Analysis.curve` draws it, of older results through its points."""
+    mode = read_analysis(group, folder / "results.h5")
+    if mode.slopes is None:
+        return mode.mode_curve()
+    drawn = mode.curve()
+    return ModeCurve.from_table({name: drawn[name] for name in ("amplitude", "omega", "omega0", "zeta", "stick")})
+
+
 def motion_of(analysis: Analysis, point: int) -> tuple[Array, Array]:
     """Displacement and velocity over one period of a point of a mode analysis, closed (first = last)."""
     columns = analysis.columns

@@ -21,6 +21,8 @@ from ...errors import InputError
 from ...files.csv_table import write_columns
 from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
+from ...post.mode_curve import ModeCurve
+from ...results.analysis import own_curve
 from ...results.reader import write_curve
 from ...results.results import AnalysisWriter, Field, open_results
 from ...texts import counted, display
@@ -230,6 +232,10 @@ class AnalysisContext(Generic[Section]):
             return labels, data[()] if points is None else np.stack([data[point] for point in points])
 
         return on_first_rank(self.comm, lambda: self._read(name, read))
+
+    def curve(self, name: str) -> ModeCurve:
+        """The curve of a finished mode, through places of its branch's own cubic between its points. Collective."""
+        return on_first_rank(self.comm, lambda: self._read(name, lambda group: own_curve(group, self.folder)))
 
     def has_results(self, name: str) -> bool:
         """Whether an analysis has rows in the run folder that belong to this very case. Collective."""

@@ -16,7 +16,7 @@ from .context import AnalysisContext
 def curves_of(context: AnalysisContext[AnalysisSection], backbones: Sequence[str]) -> dict[str, ModeCurve]:
     """Backbones that have results. Collective."""
     names = [name for name in backbones if context.has_results(name)]
-    return {name: ModeCurve.from_table(context.table(name)) for name in names}
+    return {name: context.curve(name) for name in names}
 
 
 def write_peaks(
