@@ -113,6 +113,16 @@ def test_pictures_and_words(swept: Path, capsys) -> None:
     assert "95 % confidence intervals" in shown and "slip from" not in shown
 
 
+def test_damping_that_is_rounding_is_told_as_none() -> None:
+    """Of draws that all stick; the table keeps the numbers."""
+    plan = Plan({"model.seed": [1, 2, 3, 4, 5, 6]})
+    rows = [{"model.seed": k + 1, "value": k, "done": 1, "zeta_at_1": 1e-31 * (k - 3)} for k in range(6)]
+    told = quantile_lines("mode", plan, rows, [Column("zeta_at_1", "1", "damping")], "")
+    assert told[0] == "mode: zeta_at_1: 50 % 0 [0, 0] (n = 6)"
+    few = quantile_lines("mode", Plan({"model.seed": [1, 2, 3]}), rows[:3], [Column("zeta_at_1", "1", "damping")], "")
+    assert few[0] == "mode: zeta_at_1: 50 % 0 [unknown, unknown] (n = 3)"
+
+
 def test_failed_values_are_left_out_and_named_and_other_keys_stay_apart(tmp_path: Path, capsys) -> None:
     """A branch that may have two points only stops early: with one of two values of the key all draws do."""
     (tmp_path / "case.toml").write_text(UNCERTAIN + CASE)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..columns import PURE, Column
 from ..post.grid import Plan, value_text
+from ..post.mode_curve import without_rounding
 from ..post.quantiles import CONFIDENCE, least_count, quantiles
 
 Row = Mapping[str, Any]
@@ -140,9 +141,11 @@ def range_text(values: Iterable[float]) -> str:
 
 
 def _word(row: Row) -> str:
-    low, high = (f"{row[key]:.5g}" if math.isfinite(row[key]) else "unknown" for key in ("low", "high"))
+    told = without_rounding if "zeta" in row["quantity"] else float
+    value, low, high = row["value"], row["low"], row["high"]
+    ends = ", ".join(f"{told(end):.5g}" if math.isfinite(end) else "unknown" for end in (low, high))
     unit = "" if row["unit"] in PURE else f" {row['unit']}"
-    return f"{100 * row['q']:g} % {row['value']:.5g} [{low}, {high}]{unit}"
+    return f"{100 * row['q']:g} % {told(value):.5g} [{ends}]{unit}"
 
 
 def _count(row: Row) -> str:
