@@ -47,6 +47,7 @@ def test_reading_gets_better_by_the_fourth_power_of_the_step_and_a_straight_line
     assert cubic[-1] < 1e-3 * straight[-1]
 
 
+@pytest.mark.ranks(1)
 def test_columns_that_a_script_changes_are_its_own(tmp_path):
     """``percent = branch["zeta"]; percent *= 100`` made the saved table and pictures of it a hundred times larger."""
     branch = fw.follow(mode(), 0.5, 1.0, steps=steps(0.2))
