@@ -36,8 +36,8 @@ std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
 /// far above the others it serves them all. Collective.
 std::vector<EigenPair> lowest_beside_zero(Pencil, PetscInt count);
 
-/// InputError where K is negative for one of these motions, ascending, beyond its rounding and beside the
-/// first that it holds. Collective.
+/// InputError where K is negative for the first of these motions, ascending, beyond what printed digits
+/// leave. Collective.
 void expect_stable(Pencil const&, std::vector<EigenPair> const&);
 
 /// Whether an eigenvalue is that of a motion that nothing holds, but for rounding; `scale`: of the stiffest

@@ -82,8 +82,12 @@ Transient::Transient(model::Model const& model, std::vector<Excitation> excitati
   check(KSPSetFromOptions(mass_));
   check(KSPSetUp(mass_));
   PCFailedReason reason;
+  KSPConvergedReason solved;
   check(PCGetFailedReason(factor_of(mass_), &reason));  // options may have chosen another PC
-  if (reason != PC_NOERROR)
+  check(VecSet(force_, 1));
+  check(KSPSolve(mass_, force_, acceleration_));  // copies of several ranks tell only then (PETSc 3.26)
+  check(KSPGetConvergedReason(mass_, &solved));
+  if (reason != PC_NOERROR || solved < 0)
     throw InputError("the mass matrix is singular", "a pivot that is zero beside its smallest diagonal entry",
                      "a mass for every motion", "give every dof a mass, or reduce the model");
 }
@@ -148,11 +152,20 @@ void Transient::record(TS ts) {
 }
 
 /// A trial step towards a state whose forces would be no numbers is taken shorter.
-PetscErrorCode Transient::expect_numbers(TS, PetscReal, Vec state, PetscBool* accept) {
-  double size;
-  PetscErrorCode code = VecNorm(state, NORM_INFINITY, &size);
-  *accept = size <= largest_cubed ? PETSC_TRUE : PETSC_FALSE;  // not of nan
-  return code;
+PetscErrorCode Transient::expect_numbers(TS ts, PetscReal, Vec state, PetscBool* accept) {
+  Transient* self;
+  PetscErrorCode code = TSGetApplicationContext(ts, &self);
+  if (code) return code;
+  return self->guard_.run([&] {
+    int numbers = 1;
+    {
+      ReadArray in(state);
+      for (PetscInt i = 0; i < local_size(state); ++i)
+        if (!(std::abs(in[i]) <= largest_cubed)) numbers = 0;  // nor nan, which a maximum over ranks loses
+    }
+    MPI_Allreduce(MPI_IN_PLACE, &numbers, 1, MPI_INT, MPI_MIN, self->model_.comm());
+    *accept = numbers ? PETSC_TRUE : PETSC_FALSE;
+  });
 }
 
 void Transient::use_explicit(TS ts) {

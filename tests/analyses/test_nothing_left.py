@@ -204,10 +204,10 @@ def test_other_trouble_with_stuck_modes_is_told(name, tmp_path, capfd, monkeypat
     """It was taken for "nothing to move", and the run went on from the modes without contact, exit 0."""
     own = fretwave.model.modes.linear_modes
 
-    def troubled(model, count=6, contact="stuck", near=None):
+    def troubled(model, count=6, contact="stuck", near=None, stable=False):
         if contact == "stuck" and model.contacts:
             raise InputError("the factor is too large")
-        return own(model, count, contact, near)
+        return own(model, count, contact, near, stable)
 
     monkeypatch.setattr(fretwave.model.modes, "linear_modes", troubled)
     path = tmp_path / "case.toml"

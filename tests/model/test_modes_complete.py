@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 from models.core_models import chain, single_dof
 from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
+from fretwave import fe
 from fretwave.errors import FretwaveError, InputError
 
 #: Wheels and chains drawn by the property test; several ranks take every 25th.
@@ -128,12 +130,27 @@ def test_a_structure_that_is_unstable_is_refused_where_it_has_to_be_stable(comm,
         assert [mode.omega**2 for mode in modes] == pytest.approx(squares[:3], rel=1e-6, abs=1e-12)
 
 
-def test_a_rigid_motion_that_printed_digits_make_negative_is_stable(comm):
-    """Three masses in a ring of springs 1e9 / 3, printed with seven digits: -200 where zero would be."""
-    K = 9999999.0e2 * np.eye(3) - 333333400.0 * np.ones((3, 3))
-    assert np.linalg.eigvalsh(K)[0] < -100
-    modes = fw.linear_modes(fw.Model(np.eye(3), K, comm=comm), 3, stable=True)
-    assert modes[0].omega == 0 and modes[2].omega == pytest.approx(np.sqrt(1e9), rel=1e-6)
+@pytest.mark.parametrize("digits", [8, 9, 12, 15])
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_rigid_motions_that_printed_digits_make_negative_are_stable(comm, digits, count):
+    """A free block of hexahedra, distorted: six motions at zero but for the digits that its K has lost."""
+    M, K = (printed(A.toarray(), digits) for A in free_block())
+    squares = scipy.linalg.eigh(K, M, eigvals_only=True)
+    modes = fw.linear_modes(fw.Model(M, K, comm=comm), count, stable=True)
+    assert digits > 9 or squares[0] < -1e-12 * squares[-1]
+    if count == 8:
+        assert [mode.omega for mode in modes[6:]] == pytest.approx(np.sqrt(squares[6:8]), rel=1e-4)
+
+
+def free_block():
+    """M and K of 3 x 2 x 2 cells."""
+    block = fe.Block("block", (3, 2, 2), lambda u: u * [0.3, 0.2, 0.1] + 0.02 * np.sin(3 * u[:, ::-1]))
+    return fe.assemble(fe.join([block], 2), fe.Material(210e9, 0.3, 7850.0))
+
+
+def printed(A, digits):
+    """Symmetric, each entry with so many significant digits."""
+    return np.array([[float(f"{x:.{digits - 1}e}") for x in row] for row in (A + A.T) / 2])
 
 
 def test_a_single_dof_has_one_mode(comm):

@@ -58,6 +58,15 @@ def test_noise_hides_no_slow_motion_that_goes_further(zeta, count):
     assert end_of(linear(zeta, 1000) * noise(1000)).text == NOT_SETTLED
 
 
+@pytest.mark.parametrize("periods", [5.0, 16.0, 30.0, 80.0])
+@pytest.mark.parametrize("gone", [1e-4, 2e-3, 5e-3])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_motion_that_grows_away_from_the_beginning_has_not_settled(periods, gone, sign):
+    """It grows away by a factor of e in so many periods: its own curvature is no swing."""
+    amplitude = 1.0 + sign * gone * np.exp((np.arange(300) - 299) / periods)
+    assert not any(end_of(amplitude[:count]).text == LIMIT_CYCLE for count in range(290, 301))
+
+
 @pytest.mark.parametrize("start", [0.1, 0.5, 0.9, 2.0])
 @pytest.mark.parametrize("size", [0.0, SAMPLED])
 def test_a_motion_settles_when_less_than_the_tolerance_is_to_come(start, size):

@@ -77,6 +77,13 @@ def test_the_error_of_damping_moves_a_cycle_along_the_branch(end):
     assert unknown["amplitude_error"] is None and place(unknown, "m") == "a = 2 m, 6 Hz"
 
 
+def test_nothing_is_told_of_a_cycle_whose_damping_only_touches_zero():
+    a = np.array([1.0, 2.0, 3.0])
+    table = {"amplitude": a, "zeta": np.array([0.01, 0.0, 0.01]), "frequency_hz": np.ones(3), "zeta_error": 1e-5 * a}
+    table |= {"event": np.array(["", "zero_damping", ""]), "omega_error": 1e-5 * a}
+    assert limit_cycles(table)[0]["amplitude_error"] is None
+
+
 def test_a_start_that_sticks_undamped_is_no_cycle():
     table = branch([0.0])
     table |= {"event": np.full(len(table["zeta"]), ""), "stick": np.minimum(1.0, 1.1 - table["amplitude"] / 10.0)}

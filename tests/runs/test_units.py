@@ -26,7 +26,7 @@ COUNTS = (("coordinate", "newton"), ("over_friction_summary", "newton"))
 #: Errors, which are differences of two solutions, by what they are errors of.
 ERRORS_OF = {"lambda": "omega", "omega": "omega", "amplitude": "amplitude", "zeta": "zeta"}
 #: Whose error estimates have more unknowns than the direct route takes.
-BY_GMRES = ("coordinate", "forced")
+BY_GMRES = ("coordinate", "forced", "forced_peaks")
 TABLES = ("rest", "mode", "coordinate", "forced", "forced_peaks", "wear", "over_friction", "over_friction_summary")
 
 

@@ -190,6 +190,22 @@ def test_a_motion_to_infinity_in_finite_time_ends_there(comm, limit, dt_out):
         assert run["reason"] == "limit" and reached > limit
 
 
+class BrokenLaw(CubicLaw):
+    """No number beyond u = 5."""
+
+    def force(self, u, v):
+        return np.where(np.abs(u) < 5.0, super().force(u, v), np.nan)
+
+
+@pytest.mark.ranks(1, 2)
+@pytest.mark.parametrize("dof", [0, 1])
+def test_steps_to_where_a_law_has_no_numbers_are_refused_on_every_rank(comm, dof):
+    """A maximum over ranks loses those that are none."""
+    law = fw.Contact(BrokenLaw(-1.0), np.eye(2)[[dof]])
+    run = fw.Transient(fw.Model(np.eye(2), np.eye(2), None, [law], comm)).run([1.5, 1.5], [0.0, 0.0], 20.0, 0.01, 1e-6)
+    assert not run["finished"] and np.all(np.isfinite(run["x"])) and 2.0 < run["x"][-1, dof] <= 6.0
+
+
 @SERIAL
 def test_same_integrator_serves_two_runs(comm):
     """Nothing of the first run is left in the second."""

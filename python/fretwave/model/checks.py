@@ -48,11 +48,13 @@ def check_entries(letter: str, A: Sparse, where: str) -> InputError | None:
     )
 
 
-def check_symmetric(letter: str, A: Sparse, where: str, dofs: Sequence[object]) -> InputError | None:
+def check_symmetric(
+    letter: str, A: Sparse, where: str, dofs: Sequence[object], tolerance: float = SYMMETRY_TOLERANCE
+) -> InputError | None:
     """Measured asymmetry and the worst pair of entries."""
     difference = (A - A.T).tocoo()
     scale = abs(A).max()
-    if not difference.nnz or abs(difference.data).max() <= SYMMETRY_TOLERANCE * scale:
+    if not difference.nnz or abs(difference.data).max() <= tolerance * scale:
         return None
     worst = int(np.argmax(abs(difference.data)))
     i, j = sorted((int(difference.row[worst]), int(difference.col[worst])))
@@ -62,7 +64,7 @@ def check_symmetric(letter: str, A: Sparse, where: str, dofs: Sequence[object]) 
         measured=f"{letter}[{i}][{j}] = {A[i, j]:g} and {letter}[{j}][{i}] = {A[j, i]:g}"
         f" (dofs {dofs[i]}, {dofs[j]}); largest difference {abs(difference.data[worst]) / scale:.3g}"
         " of the largest entry",
-        expected=f"{letter} = transpose of {letter} within {SYMMETRY_TOLERANCE:g} of the largest entry",
+        expected=f"{letter} = transpose of {letter} within {tolerance:g} of the largest entry",
         fix=f"correct the entry, or use ({letter} + transpose)/2 if this is rounding",
     )
 

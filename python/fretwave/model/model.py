@@ -32,6 +32,10 @@ if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
 
 
+#: Asymmetry of M that is rounding, of single precision too.
+SINGLE = 1e-6
+
+
 def _tangents(contact: Contact) -> int:
     """Components beside the normal one."""
     return contact.components - (contact.info.normal is not None)
@@ -172,7 +176,7 @@ class Model(Destroyable):
     @staticmethod
     def _check_mass(M: sp.csr_matrix) -> None:
         """Flow and rotation leave K and C unsymmetric, nothing leaves inertia so: one triangle of M was given."""
-        wrong = check_symmetric("M", M, "M", range(M.shape[0]))
+        wrong = check_symmetric("M", M, "M", range(M.shape[0]), SINGLE)
         if wrong:
             raise wrong
 

@@ -72,7 +72,7 @@ def linear_modes(
         By shift-invert there.
     stable : bool
         Refuse a structure whose stiffness is negative for some motion: that has no frequency, omega = 0 if it is found
-        at all. Of a symmetric K.
+        at all. Of a symmetric K; not looked at beside `near`.
 
     Raises
     ------

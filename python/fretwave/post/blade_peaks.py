@@ -85,7 +85,8 @@ def _share_of_error(table: Mapping[str, Array], level: float) -> float:
     if "amplitude_error" not in table:
         return 0.0
     top = int(np.argmax(table["amplitude"][rows]))
-    return float(table["amplitude_error"][rows][top] / table["amplitude"][rows][top])
+    amplitude = float(table["amplitude"][rows][top])
+    return float(table["amplitude_error"][rows][top]) / amplitude if amplitude else np.nan
 
 
 def _alike(amplitude: Array, observed: Array) -> bool:

@@ -63,7 +63,7 @@ def _errors(table: Mapping[str, Any], point: int) -> dict[str, Optional[float]]:
     if "zeta_error" not in table:
         return unknown
     a = np.asarray(table["amplitude"])
-    apart = np.flatnonzero(np.abs(np.log(a / a[point])) > ONE_POINT)
+    apart = np.flatnonzero(np.abs(a - a[point]) > ONE_POINT * a[point])
     rows = [*apart[apart < point][-1:], point, *apart[apart > point][:1]]
     x = a[rows] - a[point]
     if len(rows) < 2 or len(rows) == 3 and x[0] * x[2] > 0:  # at a fold there is no slope
@@ -72,6 +72,8 @@ def _errors(table: Mapping[str, Any], point: int) -> dict[str, Optional[float]]:
     if not np.isfinite(table["zeta_error"][point]) or not zeta:
         return unknown
     amplitude_error = float(table["zeta_error"][point] / abs(zeta))
+    if not amplitude_error < np.abs(x).max():  # beyond the points whose slope it takes
+        return unknown
     frequency_error = float(table["omega_error"][point] / (2 * np.pi) + abs(hertz) * amplitude_error)
     return {"amplitude_error": amplitude_error, "frequency_hz_error": frequency_error}
 

@@ -67,6 +67,8 @@ def amplitude_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_] |
         return NOWHERE
     curve = np.polyfit(offset[around], inverse[around], 2)
     place = -0.5 * curve[1] / curve[0]
+    if not np.polyval(curve, place) > 0:
+        return NOWHERE
     height = float(np.polyval(curve, place) ** -0.5)
     return Peak(float(omega[top] + place), height, 0.5 * height**3 * _left_out(offset, inverse, top, place))
 

@@ -75,17 +75,20 @@ def _to_come(level: Array, length: int) -> float:
     """Change of the level still to come, by Aitken's extrapolation over the means of the last three parts.
 
     Changes within the scatter of the last part are noise, and no more than that is to come; else the scatter counts
-    against the motion. Changes within the scatter of what came before are part of a swing, as of cycles whose samples
-    drift along their period: it goes no further. Infinite where the changes do not become smaller and are neither.
+    against the motion. Changes within the scatter of what came before, to where it has been, are part of a swing, as
+    of cycles whose samples drift along their period: it goes no further. Infinite where the changes do not become
+    smaller and are neither.
     """
     parts = level[-PARTS * length :].reshape(PARTS, length)
     before, last = np.abs(np.diff(parts.mean(axis=1)))
-    scatter, swing = _scatter(parts[-1]), _scatter(level[len(level) // 2 : -length])
+    earlier = level[len(level) // 2 : -length]
+    scatter, swing = _scatter(parts[-1]), _scatter(earlier)
     if last <= scatter:
         return scatter
     left = before - last - 2.0 * scatter
     further = float(last * (last + scatter) / left) if left > 0.0 else np.inf
-    return min(further, swing) if last <= swing else further
+    returns = last <= swing and earlier.min() <= parts[-1].mean() <= earlier.max()
+    return min(further, swing) if returns else further
 
 
 def _scatter(level: Array) -> float:

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import AnyArray
 from ..columns import Column, table_order
 from ..files.csv_table import plain, write_columns, write_rows
 from ..files.dimensions import name_dimensions
@@ -227,7 +228,7 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
     return columns
 
 
-def _unknown(like: Any, count: int) -> Any:
+def _unknown(like: AnyArray, count: int) -> AnyArray:
     """A column (count,) of a branch that has no such quantity: nan, -1 of whole numbers, empty of texts."""
     value = {"f": np.nan, "S": b""}.get(like.dtype.kind, -1)
     return np.full(count, value, dtype=like.dtype)
@@ -255,7 +256,7 @@ def parts_of(kind: str, branch: Branch) -> Iterator[tuple[dict[str, Any], dict[s
         yield {} if part is None else {split: part.item()}, summarise(kind, table, own, forces)
 
 
-def _status(attributes: Mapping[str, Any], part: Any) -> str:
+def _status(attributes: Mapping[str, Any], part: object) -> str:
     """Of one of the branches of an analysis: others that stopped early do not make it one that did."""
     ended = part in json.loads(attributes.get(ENDED, "[]"))
     return "done" if ended else str(attributes.get("status"))

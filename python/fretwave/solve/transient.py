@@ -96,6 +96,7 @@ class Transient:
         InputError
             An array does not fit the model, or a number is not above zero.
         """
+        self.model.check_unchanged()
         for name, value in (("t_end", t_end), ("dt_out", dt_out)):
             numbers(name, value)
         positive("rtol", rtol)

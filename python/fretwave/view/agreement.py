@@ -35,6 +35,18 @@ BEYOND = 3.0
 DETAIL = 0.01
 #: Energy below this share of what its terms are is rounding: of a body that moves rigidly.
 ROUNDING = 1e-9
+#: Entries that tell how many digits of K were printed.
+LOOKED_AT = 10_000
+
+
+def rounding(K: sp.csr_matrix) -> float:
+    """`ROUNDING`, or a hundred units of the last digit of a matrix that was printed with fewer."""
+    some = K.data[K.data != 0][:LOOKED_AT]
+    for digits in range(6, 11):
+        scale = 10.0 ** (digits - 1 - np.floor(np.log10(abs(some))))
+        if len(some) and np.all(abs(np.rint(some * scale) / scale - some) <= 1e-14 * abs(some)):
+            return max(ROUNDING, 100 * 10.0**-digits)
+    return ROUNDING
 
 
 @dataclass(frozen=True)
@@ -89,7 +101,7 @@ class Own:
         chosen = _columns(labels, motion)
         motion, displacement = motion[:, chosen], displacement[..., chosen]
         own = np.einsum("nc,nc->", motion, self.K @ motion) / 2
-        if own > ROUNDING * np.einsum("nc,nc->", abs(motion), abs(self.K) @ abs(motion)):
+        if own > rounding(self.K) * np.einsum("nc,nc->", abs(motion), abs(self.K) @ abs(motion)):
             yield self._of_energy(own, motion, displacement, worst)
         if self.lonely:
             yield f"note: {counted(self.lonely, 'node')} that K moves are of no solid cell: no stress is told there"

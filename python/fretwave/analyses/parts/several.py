@@ -20,7 +20,7 @@ def stopped_before(own: Mapping[str, Any]) -> dict[int, str]:
     return {} if kept is None else {int(k): why for k, why in json.loads(bytes(np.asarray(kept))).items()}
 
 
-def with_stopped(stopped: Mapping[int, str], **own: Any) -> dict[str, Any]:
+def with_stopped(stopped: Mapping[int, str], **own: float) -> dict[str, Any]:
     """An analysis' own part of the state to go on from, with why earlier branches stopped."""
     return {**own, STOPPED: np.frombuffer(json.dumps(dict(stopped)).encode(), dtype=np.uint8)}
 
