@@ -24,6 +24,8 @@ LARGEST_ENTRY = 1e150
 
 #: Up to this size definiteness is decided by a dense eigenvalue problem.
 DENSE_LIMIT = 600
+#: Asymmetry of M that is rounding, of single precision too.
+SINGLE = 1e-6
 
 
 NAMES = {"M": "mass matrix", "K": "stiffness matrix", "C": "damping matrix", "B": "contact map"}
@@ -67,6 +69,18 @@ def check_symmetric(
         expected=f"{letter} = transpose of {letter} within {tolerance:g} of the largest entry",
         fix=f"correct the entry, or use ({letter} + transpose)/2 if this is rounding",
     )
+
+
+def check_inertia(M: Sparse) -> None:
+    """Flow and rotation leave K and C unsymmetric, nothing leaves inertia so: one triangle of M was given.
+
+    Raises
+    ------
+    InputError
+    """
+    wrong = check_symmetric("M", M, "M", range(M.shape[0]), SINGLE)
+    if wrong:
+        raise wrong
 
 
 def check_mass(M: Sparse, where: str, dofs: Sequence[str]) -> InputError | None:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import InputError
+from ..texts import nearest, shortened
 from ..units import SYSTEMS
 from .cells import wrong_cells
 from .sectors import is_by_sector
 
 if TYPE_CHECKING:
     from .structure import Structure
+
+
+def no_such_dof(name: str, known: Sequence[str]) -> InputError:
+    """Of a name that is none of a structure's dofs."""
+    fix = nearest(name, known) or "`dof_names` lists them"
+    return InputError("there is no dof of this name", None, repr(name), shortened(", ".join(known), 60), fix)
 
 
 def complaint_of(structure: Structure) -> str | None:

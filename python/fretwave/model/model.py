@@ -15,16 +15,15 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import whole
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
 from ..units import SI, UnitSystem, unit_system
-from .checks import check_entries, check_symmetric
+from .checks import check_entries, check_inertia
 from .contact import Contact, contact_list
 from .omitted import OmittedModes
 from .rest import Rest
-from .sectors import Given, Term, by_sector, real_csr
+from .sectors import Given, Term, by_sector, check_wave, real_csr
 from .unchanged import Taken
 from .wheel_matrix import WheelMatrix
 
@@ -32,23 +31,9 @@ if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
 
 
-#: Asymmetry of M that is rounding, of single precision too.
-SINGLE = 1e-6
-
-
 def _tangents(contact: Contact) -> int:
     """Components beside the normal one."""
     return contact.components - (contact.info.normal is not None)
-
-
-def _check_wave(sectors: int, nodal_diameter: int) -> None:
-    """A wave closes around the wheel."""
-    if (whole(sectors) or 0) < 1 or whole(nodal_diameter) is None:
-        measured, expected = (
-            f"sectors={sectors!r}, nodal_diameter={nodal_diameter!r}",
-            "whole numbers, one sector or more",
-        )
-        raise InputError("a wave goes a whole number of times around a wheel", None, measured, expected, "round them")
 
 
 def _entries(given: Given, letter: str, where: str | None = None) -> sp.csr_matrix:
@@ -99,7 +84,7 @@ class Model(Destroyable):
         units: str | UnitSystem = SI,
         omitted: OmittedModes | None = None,
     ) -> None:
-        _check_wave(sectors, nodal_diameter)
+        check_wave(sectors, nodal_diameter)
         self.units = unit_system(units) if isinstance(units, str) else units
         self.omitted = omitted
         terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]
@@ -165,20 +150,13 @@ class Model(Destroyable):
                 "a matrix of the model is not square", None, f"({n}, {columns})", "n x n", "give a square matrix"
             )
         if letter == "M" and not ahead and not isinstance(A, WheelMatrix):
-            self._check_mass(A)
+            check_inertia(A)
         begin, end = self._rows(n)
         local = A.rows(begin, end) if isinstance(A, WheelMatrix) else A[begin:end]
         size = (end - begin, n)
         mat = PETSc.Mat().createAIJ((size, size), csr=(local.indptr, local.indices, local.data), comm=self.comm)
         mat.assemble()
         return mat
-
-    @staticmethod
-    def _check_mass(M: sp.csr_matrix) -> None:
-        """Flow and rotation leave K and C unsymmetric, nothing leaves inertia so: one triangle of M was given."""
-        wrong = check_symmetric("M", M, "M", range(M.shape[0]), SINGLE)
-        if wrong:
-            raise wrong
 
     def _rows(self, n: int) -> tuple[int, int]:
         """PETSc's own split of n rows, in whole units."""

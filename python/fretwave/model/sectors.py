@@ -70,6 +70,21 @@ def is_by_sector(given: Term | None) -> bool:
     return isinstance(given, Mapping) and not sp.issparse(given)
 
 
+def check_wave(sectors: int, nodal_diameter: int) -> None:
+    """A wave closes around the wheel.
+
+    Raises
+    ------
+    InputError
+    """
+    if (whole(sectors) or 0) < 1 or whole(nodal_diameter) is None:
+        what, measured = (
+            "a wave goes a whole number of times around a wheel",
+            f"sectors={sectors!r}, nodal_diameter={nodal_diameter!r}",
+        )
+        raise InputError(what, None, measured, "whole numbers, one sector or more", "round them")
+
+
 def by_sector(given: Term | None) -> Parts:
     """{k: matrix on the sector k places ahead}, the own sector first; a plain matrix stands for {0: matrix}."""
     if given is None:

@@ -16,9 +16,8 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..errors import InputError
-from ..texts import nearest, shortened
 from ..units import SI, UnitSystem, unit_system
-from .consistency import complaint_of
+from .consistency import complaint_of, no_such_dof
 from .omitted import UNKNOWN, OmittedModes
 from .pairs import Pairs
 from .sectors import Parts, Sparse, Term, by_sector, check_balanced, check_number, combine, is_by_sector, real_csr, ties
@@ -168,8 +167,7 @@ class Structure:
         if wanted in self.dofs:  # one of several names of a dof
             return self.dofs[wanted]
         if wanted not in known:
-            fix = nearest(wanted, known) or "`dof_names` lists them"
-            raise InputError("there is no dof of this name", None, repr(wanted), shortened(", ".join(known), 60), fix)
+            raise no_such_dof(wanted, known)
         return known.index(wanted)
 
     def places(self, name: str) -> list[int]:
