@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -37,6 +38,11 @@ def shortened(text: str, longest: int = 200) -> str:
 def counted(number: int, word: str) -> str:
     """``1 dof``, ``2 dofs``."""
     return f"{number} {word}{'s' * (number != 1)}"
+
+
+def plus_minus(error: float | None) -> str:
+    """What is said of an estimated error behind a value; empty where it is not known."""
+    return "" if error is None or not math.isfinite(error) else f" +- {error:.1g}"
 
 
 def times(number: int) -> str:

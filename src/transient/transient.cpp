@@ -121,14 +121,11 @@ void Transient::sample(double t, Vec state) {
   history_.v.emplace_back(in.data() + n, in.data() + 2 * n);
 }
 
-/// Largest displacement over all ranks of a state of this rank's [x, v].
-double Transient::largest(Vec state) {
+/// Largest displacement of this rank's dofs in a state [x, v].
+double Transient::largest(Vec state) const {
   double out = 0;
-  {
-    ReadArray in(state);
-    for (PetscInt i = 0; i < model_.local_dofs(); ++i) out = std::max(out, std::abs(in[i]));
-  }
-  MPI_Allreduce(MPI_IN_PLACE, &out, 1, MPI_DOUBLE, MPI_MAX, model_.comm());
+  ReadArray in(state);
+  for (PetscInt i = 0; i < model_.local_dofs(); ++i) out = std::max(out, std::abs(in[i]));
   return out;
 }
 
@@ -136,19 +133,20 @@ double Transient::largest(Vec state) {
 /// limit, if it does so between two samples with that state: to infinity in a finite time the last way is
 /// shorter.
 void Transient::record(TS ts) {
-  double t, sampled = 0;
+  double t, reached[2] = {};  // by the samples, at the step's end
   check(TSGetTime(ts, &t));
   for (double next = interval_ * double(history_.t.size()); next <= std::min(t, end_) * (1 + 1e-14);
        next = interval_ * double(history_.t.size())) {
     check(TSInterpolate(ts, std::min(next, t), interpolated_));
     sample(next, interpolated_);
-    sampled = std::max(sampled, largest(interpolated_));
+    reached[0] = std::max(reached[0], largest(interpolated_));
   }
   Vec state;
   check(TSGetSolution(ts, &state));
-  const bool beyond = t < end_ && largest(state) > limit_;
-  if (beyond && sampled <= limit_) sample(t, state);
-  if (beyond || sampled > limit_) check(TSSetConvergedReason(ts, TS_CONVERGED_USER));
+  reached[1] = t < end_ ? largest(state) : 0;
+  MPI_Allreduce(MPI_IN_PLACE, reached, 2, MPI_DOUBLE, MPI_MAX, model_.comm());
+  if (reached[1] > limit_ && reached[0] <= limit_) sample(t, state);
+  if (std::max(reached[0], reached[1]) > limit_) check(TSSetConvergedReason(ts, TS_CONVERGED_USER));
 }
 
 /// A trial step towards a state whose forces would be no numbers is taken shorter.
@@ -163,7 +161,7 @@ PetscErrorCode Transient::expect_numbers(TS ts, PetscReal, Vec state, PetscBool*
       for (PetscInt i = 0; i < local_size(state); ++i)
         if (!(std::abs(in[i]) <= largest_cubed)) numbers = 0;  // nor nan, which a maximum over ranks loses
     }
-    MPI_Allreduce(MPI_IN_PLACE, &numbers, 1, MPI_INT, MPI_MIN, self->model_.comm());
+    MPI_Allreduce(MPI_IN_PLACE, &numbers, 1, MPI_INT, MPI_LAND, self->model_.comm());
     *accept = numbers ? PETSC_TRUE : PETSC_FALSE;
   });
 }

@@ -71,7 +71,7 @@ class Transient {
   void assemble(double shift, Mat A);
   void assemble_contact(size_t number, Mat A);
   void add_tangent(size_t number, Vec x, Vec out);
-  double largest(Vec state);
+  double largest(Vec state) const;
   void record(TS);
   void watch(TS);
   void sample(double t, Vec state);

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SOFT = 1e-4
 #: Dofs and rows up to which it is looked at what pairs bear of a force, by a factor of K.
 FEW = 20_000, 500
+#: Of these rows at a time: the first of them often tell.
 AT_ONCE = 20
 #: Largest amplitude over the model's size: linear elasticity and contact of fixed pairs end before.
 LARGE = 0.1
@@ -111,7 +112,7 @@ def _of_stiffness(case: Case, contact: Contact, role: Role, own: Array) -> Itera
         (np.nanargmax, np.nanmax(ratio) > STIFF, "stiffer", "a softer contact, which solvers bear better"),
         (np.nanargmin, np.nanmin(ratio) < SOFT, "softer", "a stiffer contact: this one holds nothing"),
     ):
-        if beyond and not (word == "softer" and _holds(case, contact, role)):
+        if beyond and not (word == "softer" and _holds_something(case, contact, role)):
             pair, unit = int(extreme(ratio)), case.units("force/length")
             value = float(np.broadcast_to(given, own.shape)[pair])
             yield InputError(
@@ -123,8 +124,8 @@ def _of_stiffness(case: Case, contact: Contact, role: Role, own: Array) -> Itera
             )
 
 
-def _holds(case: Case, contact: Contact, role: Role) -> bool:
-    """Whether a contact softer than its nodes is none that holds nothing: a beam's tip is as much softer than they."""
+def _holds_something(case: Case, contact: Contact, role: Role) -> bool:
+    """Whether a contact that is far softer than its nodes is not so beside the structure: a beam's tip is soft too."""
     rows = [k for k in range(contact.components) if contact.info.stiffness_along(k) == role]
     B = sp.csr_matrix(by_sector(contact.B)[0])
     n_pairs = B.shape[0] // contact.components

@@ -62,8 +62,7 @@ def moves_of(structure: Structure) -> IntArray | None:
         return None
     if structure.coordinates is None:
         return structure.labels
-    given = structure.displacements
-    table = np.arange(structure.n_dof).reshape(-1, 3) if given is None else np.asarray(given)
+    table = structure.dofs_of_nodes
     node, column = np.nonzero(table >= 0)
     found = np.full((structure.n_dof, 2), -1, dtype=np.int64)
     found[table[node, column]] = np.column_stack([node, column + 1])

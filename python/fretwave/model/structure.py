@@ -206,8 +206,15 @@ class Structure:
             return self.resultants
         if self.expansion is not None or self.whole or (self.displacements is None and self.n_dof % 3):
             return {}
-        places = np.arange(self.n_dof).reshape(-1, 3) if self.displacements is None else np.asarray(self.displacements)
+        places = self.dofs_of_nodes
         return {name: np.append(load, 0.0)[places].sum(axis=0) for name, load in self.loads.items()}
+
+    @property
+    def dofs_of_nodes(self) -> Indices:
+        """(n_nodes, 3) dof of each node along x, y, z as `displacements` numbers them, -1 where it is held."""
+        if self.displacements is not None:
+            return np.asarray(self.displacements)
+        return np.arange(self.n_dof if self.coordinates is None else 3 * len(self.coordinates)).reshape(-1, 3)
 
     def sparse(self) -> Structure:
         """The same with all matrices in CSR form of float."""

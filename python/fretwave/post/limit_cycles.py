@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
-from ..texts import counted
+from ..texts import counted, plus_minus
 from .mode_curve import NO_DAMPING, forward
 
 #: The state of the contact in which motions begin to grow.
 STUCK = "stuck"
 #: Of a limit cycle, by what is known of it.
 SHORT = {True: "stable in its own amplitude", False: "unstable", None: "stability unknown"}
+#: What the errors of a cycle take the slopes of, over amplitude.
 OF_A_CYCLE = ("zeta", "frequency_hz")
 #: Points of a branch whose amplitudes differ relatively by less are one.
 ONE_POINT = 1e-6
@@ -49,12 +50,9 @@ def limit_cycles(table: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def place(cycle: Mapping[str, Any], unit: str) -> str:
     """Amplitude and frequency in words."""
-    a, hertz = (_with_error(cycle[name], cycle.get(f"{name}_error")) for name in ("amplitude", "frequency_hz"))
+    names = ("amplitude", "frequency_hz")
+    a, hertz = (f"{cycle[name]:.5g}{plus_minus(cycle.get(f'{name}_error'))}" for name in names)
     return f"a = {a} {unit}, {hertz} Hz"
-
-
-def _with_error(value: float, error: Optional[float]) -> str:
-    return f"{value:.5g}" + ("" if error is None else f" +- {error:.1g}")
 
 
 def _errors(table: Mapping[str, Any], point: int) -> dict[str, Optional[float]]:

@@ -50,9 +50,9 @@ def amplitude_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_] |
     """Largest amplitude of a motion that need not be observed (a blade of many); none at the ends of the range.
 
     The error is that of reading the amplitude off. Where it lies on a located peak of its own (`event`), it is that
-    point. Elsewhere 1/a^2, which is almost a parabola
-    of the frequency at a resonance, is drawn through the three points around the largest one. Across the top of a
-    response the frequency never turns round, even where the curve folds.
+    point. Elsewhere 1/a^2, which is almost a parabola of the frequency at a resonance, is drawn through the three
+    points around the largest one. Across the top of a response the frequency never turns round, even where the curve
+    folds.
     """
     top = int(np.argmax(amplitude))
     if top in (0, len(amplitude) - 1):

@@ -120,8 +120,7 @@ def translations(given: Structure) -> Array | None:
         return None if motions is None else motions[:, :3]
     if given.coordinates is None or given.expansion is not None:
         return None
-    count = len(given.coordinates)
-    places = np.arange(3 * count).reshape(-1, 3) if given.displacements is None else np.asarray(given.displacements)
+    places = given.dofs_of_nodes
     moved = np.zeros((given.n_dof + 1, 3))  # the last row takes what is held
     for axis in range(3):
         moved[places[:, axis], axis] = 1.0

@@ -23,7 +23,7 @@ from ..fe.internal_forces import StressPoints
 from ..fe.strain import cells_around
 from ..model.structure import SPIN, Structure
 from ..texts import counted, display
-from .constants import Constants, constants_of
+from .constants import Constants, at_nodes, constants_of
 
 #: Share of the energy that is told: a stress off by half as much, in the mean. Elements of full integration and of the
 #: points at which strain is best differ from one of both by 1e-10; selective integration (B-bar) by 0.02 to 0.14 in
@@ -81,7 +81,7 @@ class Own:
         nodes, K = np.asarray(structure.coordinates), sp.csr_matrix(K)
         points, full = (StressPoints.of(nodes, solids_of(structure), elastic, full) for full in (False, True))
         constants = constants_of(structure, K, points)
-        lonely = (cells_around(len(nodes), solids_of(structure)) == 0) & _moving(structure)
+        lonely = (cells_around(len(nodes), solids_of(structure)) == 0) & (structure.dofs_of_nodes >= 0).any(axis=1)
         return cls(structure, K, points, full, constants, int(lonely.sum()), display(case.path))
 
     def compare(self, labels: Sequence[str], motion: Array, displacement: Array, worst: int) -> Iterator[str]:
@@ -125,12 +125,9 @@ class Own:
 
     def _most(self, points: StressPoints, motion: Array, displacement: Array) -> int:
         """Number of the node at which the forces of K and of the stress differ most."""
-        given = self.structure.displacements
-        forces = np.vstack([self.K @ motion, np.zeros(motion.shape[1])])
-        own = forces[:-1] if given is None else forces[np.asarray(given).ravel()]
-        off = own.reshape(displacement.shape) - points.forces(displacement)
-        if given is not None:
-            off[np.asarray(given) < 0] = 0.0  # what is held is held by forces that K does not have
+        table = self.structure.dofs_of_nodes
+        off = at_nodes(self.K @ motion, table) - points.forces(displacement)
+        off[table < 0] = 0.0  # what is held is held by forces that K does not have
         return int(node_numbers(self.structure)[np.argmax(np.linalg.norm(off, axis=(1, 2)))])
 
     def _of_constants(self, displacement: Array, worst: int) -> Iterator[str]:
@@ -182,14 +179,6 @@ MORE = (
     " or modes that the matrices do not have), and have less stress than that told"
 )
 LESS = "K holds more than these cells: springs, shells, stress stiffness of a speed, or cells that the mesh lacks"
-
-
-def _moving(structure: Structure) -> npt.NDArray[np.bool_]:
-    """(n_nodes,) whether nodes have dofs."""
-    given = structure.displacements
-    if given is None:
-        return np.ones(len(np.asarray(structure.coordinates)), dtype=bool)
-    return np.asarray((np.asarray(given) >= 0).any(axis=1))
 
 
 def _columns(labels: Sequence[str], motion: Array) -> npt.NDArray[np.bool_]:

@@ -70,7 +70,7 @@ def constants_of(structure: Structure, K: sp.csr_matrix, points: StressPoints) -
     solids, nodes = solids_of(structure), np.asarray(structure.coordinates)
     if structure.expansion is not None:
         return None
-    table = _table(structure)
+    table = structure.dofs_of_nodes
     fields = uniform_strains(nodes - nodes.mean(axis=0)) * _own(solids, len(nodes))[:, None, None]
     E, nu = points.elastic
     both = points.forces_of(fields, (2.5, 0.25))  # both of Lame's constants are 1
@@ -105,13 +105,6 @@ def _modulus(lame: Array) -> Array:
     return np.asarray(second * (3 * first + 2 * second) / (first + second))
 
 
-def _table(structure: Structure) -> Indices:
-    """(n_nodes, 3) dof of each node along x, y, z, -1 where it has none."""
-    count = len(np.asarray(structure.coordinates))
-    given = structure.displacements
-    return np.asarray(np.arange(3 * count).reshape(-1, 3) if given is None else given)
-
-
 def _own(solids: Solids, count: int) -> Array:
     """(n_nodes,) 0 at the inner nodes of cells, at rest in uniform strain, and 1 elsewhere."""
     own = np.ones(count)
@@ -123,8 +116,12 @@ def _forces(K: sp.csr_matrix, table: Indices, fields: Array) -> Array:
     """(n_nodes, 3, c) of K for displacements of the nodes."""
     full = np.zeros((K.shape[0] + 1, fields.shape[2]))
     full[table.ravel()] = fields.reshape(-1, fields.shape[2])  # what is not there goes to the last row
-    found = np.vstack([K @ full[:-1], np.zeros(fields.shape[2])])
-    return np.asarray(found[table.ravel()].reshape(fields.shape))
+    return at_nodes(K @ full[:-1], table)
+
+
+def at_nodes(values: Array, table: Indices) -> Array:
+    """(n_nodes, 3, c) from (n_dof, c) by the dofs of the nodes, 0 where these are held."""
+    return np.asarray(np.vstack([values, np.zeros(values.shape[1])])[table.ravel()].reshape(*table.shape, -1))
 
 
 def _grounded(K: sp.csr_matrix, table: Indices, own: Array) -> Mask:

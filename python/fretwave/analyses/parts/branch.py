@@ -19,7 +19,7 @@ from ...mpi.spread import Spread
 from ...post.contact_history import MEASURED
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
-from ...texts import times
+from ...texts import plus_minus, times
 from .observed import observed_by
 
 if TYPE_CHECKING:
@@ -64,8 +64,9 @@ def notable(row: Mapping[str, Any], units: UnitSystem) -> bool:
 
 
 def error_text(error: float) -> str:
-    """What a point's line says of an estimated error; empty where there is none."""
-    return f" +- {error:<7.1g}" if np.isfinite(error) else ""
+    """What a point's line says of an estimated error, in a column of its own; empty where there is none."""
+    told = plus_minus(error)
+    return f"{told:<11}" if told else ""
 
 
 def largest_error(what: str, errors: Array, unit: str) -> str:

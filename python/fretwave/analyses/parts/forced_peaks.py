@@ -9,7 +9,8 @@ from typing import Any
 from ...case.analysis import AnalysisSection
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import peak_table
-from .branch import error_text, largest_error
+from ...texts import plus_minus
+from .branch import largest_error
 from .context import AnalysisContext
 
 
@@ -49,8 +50,8 @@ def _peak_line(name: str, peak: dict[str, float], curves: list[str], unit: str) 
     text = f"{name}: level {peak['level']:g}: "
     if not math.isfinite(peak["amplitude"]):
         return text + "no peak within the frequency range"
-    error = error_text(peak["amplitude_error"]).rstrip()
-    text += f"peak a = {peak['amplitude']:.4g}{error} {unit} at {peak['frequency_hz']:.5g} Hz"
+    amplitude = f"{peak['amplitude']:.4g}{plus_minus(peak['amplitude_error'])}"
+    text += f"peak a = {amplitude} {unit} at {peak['frequency_hz']:.5g} Hz"
     return "".join([text, *(_distance(peak[f"distance_{curve}"], curve) for curve in curves)])
 
 

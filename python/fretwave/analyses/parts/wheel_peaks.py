@@ -18,7 +18,8 @@ from ...post.blade_peaks import beyond, blade_tables, whitehead
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import Peak, distance
 from ...results.results import AnalysisWriter
-from .branch import error_text, points_of
+from ...texts import plus_minus
+from .branch import points_of
 from .excitation import Excitation, tuned_excitation
 from .wheel_shape import in_every_sector
 
@@ -63,7 +64,7 @@ def _at_an_end(found: Optional[tuple[int, float]], unit: str) -> str:
 def _line(row: Mapping[str, float], unit: str) -> str:
     if not np.isfinite(row["amplitude"]):
         return f"level {row['level']:g}: no peak within the frequency range"
-    peak = f"{row['amplitude']:.4g}{error_text(row['amplitude_error']).rstrip()} {unit}"
+    peak = f"{row['amplitude']:.4g}{plus_minus(row['amplitude_error'])} {unit}"
     return (
         f"level {row['level']:g}: largest peak a = {peak} at {row['frequency_hz']:.5g} Hz in"
         f" sector {row['sector']:.0f}, {row['amplification']:.4f} times the tuned {row['tuned_amplitude']:.4g} {unit}"
