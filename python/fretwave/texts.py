@@ -45,6 +45,15 @@ def plus_minus(error: float | None) -> str:
     return "" if error is None or not math.isfinite(error) else f" +- {error:.1g}"
 
 
+def without_nan(value: object) -> object:
+    """The same with None where there is no number: JSON knows no nan."""
+    if isinstance(value, Mapping):
+        return {key: without_nan(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [without_nan(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def times(number: int) -> str:
     """``once``, ``2 times``."""
     return "once" if number == 1 else f"{number} times"

@@ -16,6 +16,7 @@ from ..columns import Column
 from ..errors import InputError
 from ..post.decays import decay_rows, largest_differences
 from ..post.mode_curve import at_the_end
+from ..results.summaries import DECAYS
 from ..solve.steps import COARSEST_TOLERANCE, TIME_TOLERANCE
 from ..texts import counted, toml
 from .mode import ModeAnalysis
@@ -97,6 +98,7 @@ class FreeDecayAnalysis(TransientSection):
     """``type = "free_decay"``: decay and frequency of each cycle against the mode."""
 
     pictures = ("trajectories", "free_decay")
+    summary = DECAYS
 
     type: Literal["free_decay"]
 

@@ -12,6 +12,8 @@ from ..case.analysis import register_analysis
 from ..post.decays import DIVERGES, LEAVES, NOT_SETTLED, Ending, compare, cycle_rows, ending
 from ..post.mode_curve import Crossing, ModeCurve
 from ..post.settling import LAST_CYCLES
+from ..results.summaries import CYCLES_IN_TIME
+from ..texts import without_nan
 from .free_decay import TransientSection
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
@@ -31,6 +33,7 @@ class LimitCycleAnalysis(TransientSection):
     """``type = "limit_cycle"``: where starts at several amplitudes end up."""
 
     pictures = ("trajectories", "limit_cycles")
+    summary = CYCLES_IN_TIME
 
     type: Literal["limit_cycle"]
 
@@ -54,20 +57,15 @@ class LimitCycleAnalysis(TransientSection):
                 starts.write(number, start.motion, cycle_rows(number, start.cycles))
                 stopped, faded = start.motion.diverged, bool(start.floor)
                 found = ending(start.cycles, stopped, crossings, reach, self.tolerance, faded)
-                endings.append(_known({"start": amplitude, **vars(found), **compare(found, crossings)}))
+                endings.append({"start": amplitude, **vars(found), **compare(found, crossings)})
                 line = _ending_line(amplitude, found, crossings, context.units("length"))
                 lines.append(f"{context.name}: " + "; ".join([line, *start.end(context.units("length"))]))
-            done = starts.finish(lines, endings=json.dumps(endings))
+            done = starts.finish(lines, endings=json.dumps(without_nan(endings)))
         # only now: results.h5 can be read again when the writer has closed it
         done.summary += shifted_damping(
             context, self.mode_of(context.case), context.case.analyses.of(ModeAnalysis).values()
         )
         return done
-
-
-def _known(values: dict[str, Any]) -> dict[str, Any]:
-    """None where there is no number, as JSON has it."""
-    return {key: None if value != value else value for key, value in values.items()}
 
 
 def _ending_line(start: float, found: Ending, crossings: Sequence[Crossing], unit: str) -> str:

@@ -23,7 +23,8 @@ from ..case.fields import Dof, Speed, SpeedOrRest, Whole, key
 from ..model.contact import LIMITS
 from ..model.structure import SPIN
 from ..post.engine_orders import excited_by, usual_orders
-from ..texts import counted, nearest, toml
+from ..results.summaries import AMPLIFIED, LINEAR_MODES
+from ..texts import counted, nearest, toml, without_nan
 from .parts.asymptotes import sector_phase
 from .parts.context import AnalysisContext, Outcome
 from .parts.gyroscopic import gyroscopic_lines, gyroscopic_shift
@@ -46,6 +47,7 @@ class LinearAnalysis(AnalysisSection):
     """``type = "linear"``: linear modes, of a sector over nodal diameters; crossings with engine orders."""
 
     pictures = ("safe", "campbell")
+    summary = LINEAR_MODES
 
     type: Literal["linear"]
     modes: Whole = key("linear modes of each contact and wave, from the lowest", example="6", default=6, ge=1)
@@ -234,17 +236,17 @@ class LinearAnalysis(AnalysisSection):
                     writer.append(rows[-1], np.column_stack([mode.shape, -mode.imaginary]))
                 theta = sector_phase(context.case, diameters)
                 shift = max([shift, *(gyroscopic_shift(modes, C, theta) for modes in wave.values())])
-        summary = [*_summary(context, rows), *_meet(context, rows, sectors), *_amplify(context, found)]
+        amplified = amplifications(context, found) if self.engine_order is not None else []
+        summary = [*_summary(context, rows), *_meet(context, rows, sectors), *_amplify(context, amplified)]
         summary += gyroscopic_lines(self.name, shift)
-        writer.close("done", "all modes")
+        writer.close("done", "all modes", **({AMPLIFIED: json.dumps(without_nan(amplified))} if amplified else {}))
         return Outcome(writer.rows, "all modes", True, summary)
 
 
-def _amplify(context: AnalysisContext[LinearAnalysis], found: Mapping[str, Sequence[LinearMode]]) -> list[str]:
+def _amplify(context: AnalysisContext[LinearAnalysis], rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Write ``<name>_amplification.csv``; a line for each family. Collective."""
     if context.analysis.engine_order is None:
         return []
-    rows = amplifications(context, found)
     context.write_table("amplification", {name: [row[name] for row in rows] for name in AMPLIFICATION})
     return amplification_lines(context.name, rows, context.wheel.sectors)
 

@@ -16,6 +16,7 @@ from ..errors import InputError, NotConverged
 from ..model.contact import Contact
 from ..model.law_info import STATUS
 from ..post.contact_history import normal_force, tangential_force
+from ..results.summaries import STATES_AT_REST
 from .parts.at_rest import static_at_rest
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs, loaded_state
@@ -45,6 +46,8 @@ WORDS = {state: word for word, state in STATUS.items()}
 @register_analysis
 class StaticAnalysis(AnalysisSection):
     """``type = "static"``: the static state under the preload, pair by pair."""
+
+    summary = STATES_AT_REST
 
     type: Literal["static"]
     factors: list[Positive] = key("factors on the loads of the preload", "-", "[0.5, 1.0]", default=[1.0], min_length=1)

@@ -6,6 +6,7 @@ keeps its own table in a hidden folder, from which it goes on after a kill; all 
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -24,7 +25,9 @@ from ..errors import FretwaveError, InputError
 from ..files.dimensions import names_of_data
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
+from ..results.file import ENDED
 from ..results.results import AnalysisWriter, has_results, open_results
+from ..results.summaries import WEAR_LINES
 from ..solve.steps import TOO_FAST, TOO_MANY, WearControl
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
@@ -47,6 +50,7 @@ class WearAnalysis(AnalysisSection):
     """``type = "wear"``: fretting wear of a mode at fixed amplitudes over wear cycles."""
 
     pictures = ("wear", "wear_pairs")
+    summary = WEAR_LINES
     wears = True
 
     type: Literal["wear"]
@@ -209,7 +213,8 @@ def _collect(
             _copy(context, writer, line)
         if writer.rows and writer.active:
             keep_pairs(context, writer)
-        writer.close("stopped" if failures else "done", reason)
+        ended = [line.number for line, result in zip(lines, results) if not _why(result)]
+        writer.close("stopped" if failures else "done", reason, **{ENDED: json.dumps(ended)})
     finally:
         writer.abandon()
     if writer.rows:

@@ -17,7 +17,7 @@ from ..post.grid import Plan
 from ..post.quantiles import CONFIDENCE, distribution, quantiles
 from ..results.reader import Run
 from ..results.sweep_quantiles import AMPLITUDE_AT, groups_of, over_seeds, range_text
-from ..results.sweep_summary import columns_in, spread_of, summary_of
+from ..results.sweep_summary import COUNTS, columns_in, spread_of, summary_of
 from . import style
 from .swept import Swept
 
@@ -33,7 +33,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     """One picture per sweep over seeds."""
     for analysis in run.of_kind("sweep"):
         plan, kind = Plan(analysis.attributes["over"]), str(analysis.attributes["of_type"])
-        if over_seeds(plan) and len(plan) >= LEAST and summary_of(kind).spread:
+        if over_seeds(plan) and len(plan) >= LEAST and summary_of(kind) is not COUNTS:
             swept = Swept.of(analysis)
             shown = columns_of(swept)
             if shown:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -15,6 +16,7 @@ from ..post.grid import SHOWN, Plan
 from ..results.analysis import Analysis, Table
 from ..results.file import open_results
 from ..results.sweep_summary import split_of
+from ..solve.table import Table as Reading
 from ..texts import shortened, toml
 from . import scales, style
 from .scales import Scale
@@ -28,7 +30,7 @@ class Swept:
 
     Attributes
     ----------
-    branches : (number of the value, place in `parts`, columns along the branch)
+    branches : (number of the value, place in `parts`, columns along the branch); none of analyses that follow none
     summary : quantity -> (n_1, n_2, ..., [n_parts])
     split, parts : what tells the branches of one value apart, and its values: levels, nodal diameters
     """
@@ -47,11 +49,8 @@ class Swept:
             names = [*names_of_data(group), *([split] if split in group else [])]
             summary = {key: np.asarray(group[key][()], dtype=float) for key in names}
         parts = [float(part) for part in summary.pop(split, ())]
-        plan, branches, curve = Plan(analysis.attributes["over"]), [], analysis.curve()
-        for number, (place, part) in product(range(len(plan)), enumerate(parts or [np.nan])):
-            rows = (curve["value"] == number) & (curve[split] == part if parts else True)
-            if rows.any():
-                branches.append((number, place, {name: curve[name][rows] for name in curve.names}))
+        plan = Plan(analysis.attributes["over"])
+        branches = [] if analysis.meaning is None else list(_branches(analysis.curve(), len(plan), split, parts))
         return cls(analysis, plan, branches, summary, split, parts)
 
     def unit(self, unit: str) -> str:
@@ -95,6 +94,13 @@ class Swept:
                 changed = {"linestyle": "-"} if key == self.main else {"color": style.GREY}
                 entries.append((label, {**look, **changed}))
         return entries
+
+
+def _branches(curve: Reading, values: int, split: str, parts: list[float]) -> Iterator[tuple[int, int, Table]]:
+    for number, (place, part) in product(range(values), enumerate(parts or [np.nan])):
+        rows = (curve["value"] == number) & (curve[split] == part if parts else True)
+        if rows.any():
+            yield number, place, {name: curve[name][rows] for name in curve.names}
 
 
 def tick(value: object) -> str:

@@ -16,7 +16,7 @@ from ..files.lock import is_taken
 from ..post.largest import largest
 from ..post.limit_cycles import place, stability
 from ..post.mode_curve import most_damped, without_rounding
-from ..texts import counted
+from ..texts import counted, without_nan
 from ..units import units_of
 from .file import OVERRIDES, open_results, unit_of_amplitudes
 from .record import RECORD, read_record
@@ -89,7 +89,7 @@ class Overview:
     def plain(self) -> dict[str, Any]:
         """For JSON: numbers as they are in the tables, null where there is none."""
         told = {key: value for key, value in vars(self).items() if key != "kind"}
-        return {"name": told.pop("name"), "type": self.kind, **{k: _plain(v) for k, v in told.items()}}
+        return {"name": told.pop("name"), "type": self.kind, **{k: without_nan(v) for k, v in told.items()}}
 
     def _range(self) -> str:
         if not self.range:
@@ -127,15 +127,6 @@ class Overview:
         if self.status == "running":
             return ["not finished; `fretwave resume` goes on with it when it is cut off"]
         return [f"stopped early: {self.reason}"] if self.status == "stopped" else []
-
-
-def _plain(value: object) -> object:
-    """JSON knows no nan."""
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_plain(one) for one in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _wave(cycle: Mapping[str, Any]) -> str:

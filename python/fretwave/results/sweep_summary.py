@@ -97,6 +97,8 @@ class Summary:
         Further ones that the branches of a whole wheel have.
     spread : tuple of str
         Columns whose quantiles are shown where a sweep goes over draws.
+    numbered : tuple of Column
+        As many as a branch has of each: numbers have names that begin with those of the columns; all of them are shown.
     """
 
     columns: tuple[Column, ...] = ()
@@ -105,6 +107,7 @@ class Summary:
     split: str = ""
     on_wheel: tuple[Column, ...] = ()
     spread: tuple[str, ...] = ()
+    numbered: tuple[Column, ...] = ()
 
 
 COUNTS = Summary()
@@ -125,16 +128,26 @@ def columns_in(kind: str, rows: Sequence[Row]) -> list[Column]:
     """Those that the rows of a summary have."""
     here = dict.fromkeys(name for row in rows for name in row)
     known = [*columns_of(kind), *summary_of(kind).on_wheel]
-    at = [replace(column, name=name) for column in AT for name in here if name.startswith(column.name)]
-    return [column for column in known if column.name in here] + at
+    several = [_one_of(column, name) for column in summary_of(kind).numbered for name in here if _is_of(name, column)]
+    at = [replace(column, name=name) for column in AT for name in here if _is_of(name, column)]
+    return [column for column in known if column.name in here] + several + at
+
+
+def _is_of(name: str, column: Column) -> bool:
+    return name.startswith(column.name)
+
+
+def _one_of(column: Column, name: str) -> Column:
+    """The column of one number: its long name says which."""
+    return replace(column, name=name, long_name=f"{column.long_name}, {name[len(column.name) :].replace('_', ' ')}")
 
 
 def spread_of(kind: str, columns: Sequence[Column]) -> list[Column]:
     """Columns whose quantiles are shown; of a driven wheel those of the blade that moves most."""
     of_wheel = any(column.name in (WHEEL_FORCED[0].name,) for column in columns)
     names = [name for name in summary_of(kind).spread if not (of_wheel and name in _OF_ONE)]
-    at = tuple(column.name for column in AT[1:])
-    return [column for column in columns if column.name in names or column.name.startswith(at)]
+    several = tuple(column.name for column in (*summary_of(kind).numbered, *AT[1:]))
+    return [column for column in columns if column.name in names or column.name.startswith(several)]
 
 
 def split_of(kind: str) -> str:

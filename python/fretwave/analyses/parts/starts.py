@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from ...errors import InputError, NotConverged
 from ...post.cycles import Cycles, above_noise, extract, noise_floor
 from ...post.decays import mode_state
 from ...post.settling import growth_trend
+from ...results.file import ENDED
 from ...solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
 from ...texts import counted
 from .context import AnalysisContext, Outcome
@@ -84,7 +86,7 @@ class Starts:
         model = self._model.enter_context(integrated_model(context))
         self.integrator = Transient(model, prefix=context.prefix)
         self.writer = context.writer(columns, normalise=label_of(self.mode.normalise))
-        self.stopped: list[str] = []
+        self.stopped: dict[int, str] = {}
 
     def _has_a_mean(self) -> bool:
         if MEAN not in self.labels:
@@ -119,7 +121,7 @@ class Starts:
         if found.motion.implicit:
             self.context.console.line(f"{self.context.name}: the contact is stiff: implicit steps")
         if found.motion.stopped:
-            self.stopped.append(f"start {number}: {found.motion.stopped}")
+            self.stopped[number] = f"start {number}: {found.motion.stopped}"
         return found
 
     def _grows_faster(self, cycles: Cycles) -> bool:
@@ -169,8 +171,9 @@ class Starts:
 
     def finish(self, lines: list[str], **attributes: Value) -> Outcome:
         """Close the table."""
-        reason = "; ".join(self.stopped) or "all starts integrated"
-        self.writer.close("stopped" if self.stopped else "done", reason, **attributes)
+        reason = "; ".join(self.stopped.values()) or "all starts integrated"
+        ended = json.dumps([number for number in range(len(self.section.amplitude)) if number not in self.stopped])
+        self.writer.close("stopped" if self.stopped else "done", reason, **{ENDED: ended}, **attributes)
         goal = f"{self.section.periods} periods of every start"
         advice = f"--set {self.context.name}.tolerance=1e-6, fewer periods, or a smoother contact law"
         return Outcome(self.writer.rows, reason, not self.stopped, lines, goal, advice)

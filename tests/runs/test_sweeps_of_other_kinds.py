@@ -1,0 +1,129 @@
+"""Sweeps of linear modes, wear, states at rest and motions in time: a summary of each value, quantiles over draws."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call
+from models.linear_cases import POINT, ring
+from models.swept_case import CASE, MEMORYLESS
+from models.wear_case import write_case
+from tolerances import REPEATED, SOLVED
+
+pytestmark = pytest.mark.ranks(1)
+
+SECTORS = 6
+
+
+def rows(path: Path, **chosen: str) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return [row for row in csv.DictReader(file) if all(row[key] == value for key, value in chosen.items())]
+
+
+def column(path: Path, key: str, **chosen: str) -> np.ndarray:
+    return np.array([float(row[key]) for row in rows(path, **chosen)])
+
+
+def swept(folder: Path, text: str, over: str, *only: str) -> Path:
+    """The run; summaries are of the last of the analyses."""
+    (folder / "case.toml").write_text(text)
+    words = ["--over", over, "--only", ",".join(only), "--out", folder / "run"]
+    assert call("sweep", folder / "case.toml", *words) == 0
+    return folder / "run"
+
+
+def test_how_far_mistuning_amplifies_over_draws(tmp_path: Path, capsys) -> None:
+    """Of each draw what its own table says; the quantile over all is an order statistic of these."""
+    keys = 'wheel = true\nobserve = "mass"\nengine_order = 2\nmodes = 1\ncontact = ["stuck"]\n'
+    plain = ring(SECTORS).replace("speed_rpm = 6.0\n", "").replace("C = [[0.01, 0.0], [0.0, 0.0]]\n", "")
+    text = f'{plain}{keys}mistuning = {{ standard_deviation = 0.03 }}\n[damping]\nzeta = 0.004\ncontact = "stuck"\n'
+    run = swept(tmp_path, text, "linear.mistuning.seed=1:21", "linear")
+    tables = [run / f"values/{number:04d}" for number in range(21)]
+    own = np.array([column(folder / "linear_amplification.csv", "amplification")[0] for folder in tables])
+    assert np.array_equal(column(run / "summary.csv", "amplification_stuck_1"), own)
+    hz = [column(folder / "linear.csv", "frequency_hz") for folder in tables]
+    assert np.array_equal(column(run / "summary.csv", "hz_stuck_3"), [one[2] for one in hz])
+    (median,) = rows(run / "linear_quantiles.csv", quantity="amplification_stuck_1", q="0.5")
+    assert float(median["value"]) == np.sort(own)[10]
+    assert call("show", run) == 0
+    shown = capsys.readouterr().out
+    assert f"linear: amplification_stuck_1: 5 % {np.sort(own)[0]:.3g}"[:38] in shown
+    assert (run / "linear_quantiles.png").is_file()
+
+
+def test_linear_frequencies_in_closed_form(tmp_path: Path, capsys) -> None:
+    """m = k = 1 and a slider's own stiffness beside k."""
+    linear = '[[analysis]]\nname = "linear"\ntype = "linear"\n'
+    run = swept(tmp_path, CASE + linear, "contact.slider.tangential_stiffness=0.5,1.0,3.0", "linear")
+    stiffness = np.array([0.5, 1.0, 3.0])
+    assert column(run / "summary.csv", "hz_stuck_1") == pytest.approx(np.sqrt(1 + stiffness) / (2 * np.pi), rel=SOLVED)
+    assert column(run / "summary.csv", "hz_free_1") == pytest.approx(1 / (2 * np.pi), rel=SOLVED)
+    assert "linear: tangential_stiffness = 3.0: 2 modes, 0.159155 to 0.31831 Hz" in capsys.readouterr().out
+
+
+def test_wear_by_amplitude(tmp_path: Path, capsys) -> None:
+    """First and last row of each amplitude, and the volume of all faces."""
+    path = write_case(tmp_path)
+    run = tmp_path / "run"
+    assert call("sweep", path, "--over", "wear.coefficient=1e-13,2e-13", "--only", "mode,wear", "--out", run) == 0
+    summary = run / "summary.csv"
+    assert len(rows(summary, analysis="wear")) == 6
+    for value in range(2):
+        table = run / f"values/{value:04d}/wear.csv"
+        for line in range(3):
+            mine = {"line": str(line)}
+            found = {"value": str(value), "analysis": "wear", **mine}
+            assert column(summary, "done", **found) == 1
+            for name, key, row in (("new", "zeta", 0), ("last", "zeta", -1), ("last", "frequency_hz", -1)):
+                assert column(summary, f"{name}_{key}", **found)[0] == column(table, key, **mine)[row]
+            faces = [key for key in rows(table)[0] if key.startswith("worn_")]
+            volume = sum(column(table, key, **mine)[-1] for key in faces)
+            assert column(summary, "worn_volume", **found)[0] == pytest.approx(volume, rel=REPEATED)
+            assert (volume > 0) == (line > 0)  # the first amplitude does not slip
+    shown = capsys.readouterr().out
+    assert "wear: coefficient = 2e-13, line 2: a = 3e-06 m: zeta" in shown and "after 8 cycles" in shown
+
+
+def test_states_at_rest(tmp_path: Path, capsys) -> None:
+    """One closed pair, which bears its load."""
+    text = POINT + '[[analysis]]\nname = "rest"\ntype = "static"\n'
+    run = swept(tmp_path, text, "contact.face.normal_load=1.0,2.5", "rest")
+    assert column(run / "summary.csv", "smallest_normal_force") == pytest.approx([1.0, 2.5], rel=SOLVED)
+    assert column(run / "summary.csv", "normal_force") == pytest.approx([1.0, 2.5], rel=SOLVED)
+    assert column(run / "summary.csv", "open_share").tolist() == [0.0, 0.0]
+    assert "rest: normal_load = 2.5, factor 1: 0 % of the pairs slip, 0 % are open" in capsys.readouterr().out
+
+
+def test_decays_by_start(tmp_path: Path, capsys) -> None:
+    """Beyond slip by a weak limit the decay is nearly that of the damper: half of it after log 2 / (zeta omega)."""
+    c = 0.02
+    text = CASE.replace(*MEMORYLESS).replace("friction_limit = 1.0", "friction_limit = 1e-6", 1)
+    text = text.replace("K = [[1.0]]\n", f"K = [[1.0]]\nC = [[{c}]]\n")
+    decay = '[[analysis]]\nname = "decay"\ntype = "free_decay"\nmode = "mode"\namplitude = [10.0, 20.0]\nperiods = 20\n'
+    run = swept(tmp_path, text + decay, "model.C=[[0.02]],[[0.04]]", "mode", "decay")
+    half = column(run / "summary.csv", "half_time", analysis="decay")
+    assert half == pytest.approx(2 * np.log(2.0) / np.array([c, c, 2 * c, 2 * c]), rel=1e-5)
+    zeta = column(run / "summary.csv", "largest_zeta", analysis="decay")
+    assert zeta == pytest.approx(np.array([c, c, 2 * c, 2 * c]) / 2, rel=1e-4)
+    assert "decay: C = [[0.04]], start 1: half of it after 34.65" in capsys.readouterr().out
+
+
+def test_limit_cycles_by_start(tmp_path: Path, capsys) -> None:
+    """Negative damping against the friction of a weak limit: Coulomb's amplitude 4 F / (pi |c| omega) is unstable.
+
+    The start below it comes to rest or stays, the one above grows; none settles.
+    """
+    text = CASE.replace(*MEMORYLESS).replace("friction_limit = 1.0", "friction_limit = 0.05", 1)
+    text = text.replace("K = [[1.0]]\n", "K = [[1.0]]\nC = [[-0.01]]\n")
+    cycle = '[[analysis]]\nname = "ends"\ntype = "limit_cycle"\nmode = "mode"\namplitude = [5.0, 8.0]\nperiods = 12\n'
+    run = swept(tmp_path, text + cycle, "contact.slider.friction_limit=0.05,0.052", "mode", "ends")
+    own = {"analysis": "ends"}
+    assert column(run / "summary.csv", "settled", **own).tolist() == [0, 0, 0, 0]
+    assert np.isnan(column(run / "summary.csv", "limit_cycle", **own)).all()
+    last = column(run / "summary.csv", "last_amplitude", **own)
+    unstable = 4 * np.array([0.05, 0.05, 0.052, 0.052]) / (np.pi * 0.01)
+    assert np.array_equal(last > unstable, [False, True, False, True])
+    assert "ends: friction_limit = 0.052, start 1: no limit cycle" in capsys.readouterr().out
