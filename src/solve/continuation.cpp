@@ -265,6 +265,8 @@ void Continuation::make_batch(double tried) {
   double length, next_length;
   auto end = step(length, next_length);
   if (!end || been_here(*end)) return;
+  const double stepped = MPI_Wtime() - clock_;  // belongs to the last of the batch, not to an event before it
+  clock_ += stepped;
   std::string events;
   if (turned_)
     events = events_of_corner(*end);
@@ -295,11 +297,13 @@ void Continuation::make_batch(double tried) {
   } else if (outside) {
     // a long step's interpolation is too far from the branch; how long a corner's is does not depend on this
     if (length / 2 >= steps_.minimum && length <= shorter * tried) {
+      clock_ -= stepped;
       anchor_.step = length / 2;
       return make_batch(length);
     }
     finish("the stop value is not reached: the corrector fails there", false);
   }
+  if (!batch_.empty()) batch_.back().second.wall += stepped;
   after_.index = anchor_.index + int(batch_.size());
 }
 

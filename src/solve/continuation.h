@@ -25,7 +25,7 @@ struct Point {
   double parameter = 0, step = 0;
   Outcome outcome;
   std::string event;  ///< "", start, stop, report, fold or the name of a test function
-  double wall = 0;    ///< seconds since the point before
+  double wall = 0;    ///< seconds since the point before; of a step with events inside, without theirs
 };
 
 /// Pseudo-arclength continuation of a problem's branch: tangent predictor, SNES corrector on the bordered

@@ -35,7 +35,7 @@ class Point:
     parameter : amplitude (modes) or omega (forced response)
     event : "", start, stop, report, fold, zero_damping or peak_damping of a mode, peak of a response
     step : arclength from the last regular point
-    wall_s : seconds since the point before
+    wall_s : seconds since the point before; of a step with events inside, without theirs
     rounding : error of the residual that rounding leaves, expected
     accepted : 1 where the residual is below the tolerance, 0 where rounding let it fall no further
     knot : its scalars and their derivatives over the step, where they are traced
