@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import shutil
 import subprocess
+from html import escape
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import call
 from models import two_materials
-from models.csv_columns import table
 from models.solid_meshes import deck, mesh
 
 pytestmark = pytest.mark.ranks(1)
@@ -58,6 +59,11 @@ def run_of(folder: Path, builder: str, options: str, band: tuple[float, float], 
     return call("stress", folder / "run")
 
 
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def said(capfd: pytest.CaptureFixture[str]) -> tuple[float, str]:
     """The ratio of the energies, and all lines."""
     text = capfd.readouterr().out
@@ -72,6 +78,7 @@ def test_one_material_agrees(order: int, tmp_path: Path, capfd: pytest.CaptureFi
     ratio, text = said(capfd)
     assert ratio == 1.0
     assert "warning" not in text and "note" not in text
+    assert "warning" not in rows(tmp_path / "run" / "forced_gauges.csv")[0]
 
 
 @pytest.mark.parametrize(("modulus", "ratio"), [(114e3, 0.3), (210e3, 0.33), (400e3, 0.2)])
@@ -83,6 +90,10 @@ def test_other_constants_are_told_by_the_stiffness(
     energies, text = said(capfd)
     assert f"K has youngs_modulus = {modulus:.6g} [MPa] and poisson_ratio = {ratio:.4g}" in text
     assert "warning" in text
+    kept = [row["warning"] for row in rows(tmp_path / "run" / "forced_gauges.csv") if row["warning"]]
+    assert [f"  warning: {one}" in text for one in kept] == [True]
+    assert call("report", tmp_path / "run") == 0 and call("plot", tmp_path / "run") == 0
+    assert escape(kept[0]) in (tmp_path / "run" / "report.html").read_text()
     if ratio == 0.3:
         assert energies == pytest.approx(210e3 / modulus, abs=5e-5)  # to the digits told
 
@@ -103,7 +114,7 @@ def test_two_materials_are_told_where_they_are(tmp_path: Path, capfd: pytest.Cap
     assert re.search(r"warning: .*K has 0\.543 to 0\.\d+ of the modulus of \[material\]", text)
     farthest = int(re.search(r"farthest at node (\d+)", text)[1]) - 1  # type: ignore[index]
     assert two_materials.build().coordinates[farthest, 0] > two_materials.LENGTH / 2
-    worst = int(table(tmp_path / "run" / "forced_gauges.csv")["worst_node"][0]) - 1
+    worst = int(rows(tmp_path / "run" / "forced_gauges.csv")[0]["worst_node"]) - 1
     assert two_materials.build().coordinates[worst, 0] < two_materials.LENGTH / 2
     assert "the worst node too" not in text
 

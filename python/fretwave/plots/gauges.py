@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..post.fatigue import first_reaching
+from ..post.fatigue import doubts, first_reaching
 from ..results.analysis import Analysis, Table
 from ..results.overview import amplitude_column, whose_amplitude
 from ..results.parts import PARTS, rows_of_branches
@@ -20,6 +20,8 @@ from .scales import Scale
 STRESSES = ("stress_amplitude", "mean_stress")
 #: Axes that are no amplitude.
 OVER = {"frequency_hz": "Frequency", "cycles": "Wear cycles"}
+#: Above a picture, where the table has a warning.
+DOUBTFUL = "The stress is not that of the model's stiffness: the table says why"
 #: Microstrain of a strain.
 MICRO = 1e6
 
@@ -57,6 +59,8 @@ def draw(analysis: Analysis, table: Table) -> Figure:
         style.log_amplitude(axes[-1, 0], table[over])
     what = OVER.get(over) or f"Amplitude of {analysis.observed()}"
     axes[-1, 0].set_xlabel(scale.label(what) if over == "amplitude" else style.label(what, analysis.unit(over)))
+    if doubts(table):
+        axes[0, 0].set_title(DOUBTFUL, fontsize=9.5, color=style.RED)
     for place in axes[:, 0]:
         style.legend(place, loc="best")
     return figure

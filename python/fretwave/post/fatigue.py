@@ -9,7 +9,7 @@ compression counts as no mean stress (Shigley's Mechanical Engineering Design, c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,6 +24,11 @@ INSTANTS = 64
 EQUAL = 2e-5
 #: Numbers of one block of places over the period.
 BLOCK = 4_000_000
+
+
+def doubts(table: Mapping[str, Iterable[object]]) -> list[str]:
+    """Warnings in a table of gauges and stress, which stand in one of its rows."""
+    return [str(text) for text in table.get("warning", ()) if isinstance(text, str) and text]
 
 
 def von_mises_square(stress: Array) -> Array:

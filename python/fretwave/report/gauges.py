@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..post.fatigue import doubts
 from ..results.analysis import Analysis, Table
 from ..results.reader import Run
 from . import page
@@ -20,11 +21,13 @@ def gauges_part(run: Run, analysis: Analysis) -> str:
     found, limits = (run.table_since(f"{analysis.name}_{end}") for end in ("gauges", "goodman"))
     if found is None:
         return ""
+    warnings = doubts(found)
+    found.pop("warning", None)
     rows = dict(_of_interest(found))
     parts = [_table(analysis, "gauges", found, rows)]
     if limits is not None:
         parts.append(_table(analysis, "goodman", limits, dict.fromkeys(range(len(limits["reached"])), "")))
-    return page.titled("Gauges and stress", "\n".join(parts))
+    return page.titled("Gauges and stress", "\n".join([page.box(warnings), *parts]))
 
 
 def _of_interest(table: Table) -> Iterator[tuple[int, str]]:

@@ -25,6 +25,7 @@ from ..model.structure import SPIN, Structure
 from ..texts import counted, display
 from .constants import Constants, at_nodes, constants_of
 
+WARNING = "warning: "
 #: Share of the energy that is told: a stress off by half as much, in the mean. Elements of full integration and of the
 #: points at which strain is best differ from one of both by 1e-10; selective integration (B-bar) by 0.02 to 0.14 in
 #: coarse bending at a Poisson's ratio of 0.3, reduced one (C3D8R) by 0.3 and more.
@@ -115,13 +116,13 @@ class Own:
         told = f"strain energy of the stress: {ratio:.4f} of the model's own"
         reasons = "; ".join(self._of_constants(displacement, worst))
         if reasons or abs(ratio - 1) <= ENERGY:
-            return f"warning: {told}: {reasons}" if reasons else told
+            return f"{WARNING}{told}: {reasons}" if reasons else told
         reason = MORE if ratio > 1 else LESS
         if self.constants is None:
-            return f"warning: {told}: [material] is not that of K, or {reason}"
-        kind = "note" if ratio < 1 else "warning"  # the cells are K's, and it has something else beside them
+            return f"{WARNING}{told}: [material] is not that of K, or {reason}"
+        kind = "note: " if ratio < 1 else WARNING  # the cells are K's, and it has something else beside them
         most = self._most(points, motion, displacement)
-        return f"{kind}: {told}: {reason}; most at node {most}"
+        return f"{kind}{told}: {reason}; most at node {most}"
 
     def _most(self, points: StressPoints, motion: Array, displacement: Array) -> int:
         """Number of the node at which the forces of K and of the stress differ most."""

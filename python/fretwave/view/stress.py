@@ -29,7 +29,7 @@ from ..post.largest import largest
 from ..results.parts import PARTS
 from ..results.results import open_results
 from ..texts import display
-from .agreement import Own
+from .agreement import WARNING, Own
 from .choice import Choice, analyses_that_move, analysis_name, at_point, read_choice
 from .geometry import geometry
 from .inner_nodes import with_inner_nodes
@@ -49,6 +49,8 @@ STRESS = (
     Column("stress_amplitude", "pressure", "largest von Mises stress there about the mean, over the period"),
     Column("mean_stress", "pressure", "von Mises stress of the mean there, with the sign of its trace"),
 )
+#: In the row of the largest stress, where there is any: what `agreement` warns of.
+DOUBT = Column("warning", "", "why the stress is not that of the model's stiffness", "s")
 GOODMAN = Column("goodman", "1", "Goodman's factor there: amplitude / endurance limit + mean / ultimate strength")
 
 
@@ -193,8 +195,13 @@ def _table(file: h5py.File, folder: Path, case: Case, name: str, reader: Reader)
         notes = [scene.note] * bool(scene.note)
         if rows and reader.own is not None:
             k = largest(_sizes(rows), EQUAL)
-            notes += _agreement(reader.own, replace(scene, choice=at_point(choice, group, case, k)), rows[k])
-    columns = [*_lead_columns(group, lead), *reader.columns(choice.wheel)]
+            told = _agreement(reader.own, replace(scene, choice=at_point(choice, group, case, k)), rows[k])
+            warnings = [line[len(WARNING) :] for line in told if line.startswith(WARNING)]
+            rows[k] |= {DOUBT.name: "; ".join(warnings)} if warnings else {}
+            notes += told
+    doubt = [DOUBT] if any(DOUBT.name in row for row in rows) else []
+    rows = [{DOUBT.name: "", **row} for row in rows]
+    columns = [*_lead_columns(group, lead), *reader.columns(choice.wheel), *doubt]
     return StressTable(name, [column.in_units(choice.units) for column in columns], rows, notes)
 
 
