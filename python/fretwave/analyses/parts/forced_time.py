@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
@@ -12,6 +12,7 @@ from ...case.observed import unit_of
 from ...mpi.petsc_options import TIME
 from ...post.response_peaks import points_around_peak
 from ...solve.steady import SteadyState, steady_motion
+from ...texts import counted
 from .context import AnalysisContext
 from .excitation import forces
 from .observed import dense
@@ -52,10 +53,17 @@ def time_points(
     stopped = next((str(row["stopped"]) for row in rows if row["stopped"]), "")
     lengths = unit_of(context.analysis.observe)
     context.write_table("time", {key: [row[key] for row in rows] for key in rows[0] if key != "stopped"}, lengths)
-    worst = max((abs(row["relative_difference"]) for row in rows if row["steady"]), default=np.nan)
+    return [f"{context.name}: {_compared(rows)}"], stopped
+
+
+def _compared(rows: Sequence[Mapping[str, Any]]) -> str:
+    """In words: how far both are apart at the points that became steady, where anything moves."""
     unsteady = sum(not row["steady"] for row in rows)
-    line = f"{context.name}: {len(rows)} points by time integration, amplitude differs by up to {worst:.1e} (relative)"
-    return [line + (f"; {unsteady} did not become steady" if unsteady else "")], stopped
+    apart = [abs(row["relative_difference"]) for row in rows if row["steady"]]
+    known = [value for value in apart if np.isfinite(value)]
+    words = f"amplitude differs by up to {max(known):.1e} (relative)" if known else "no amplitude to compare"
+    words += f"; {unsteady} did not become steady" if unsteady else ""
+    return f"{counted(len(rows), 'point')} by time integration, {words}"
 
 
 def _integrated(
