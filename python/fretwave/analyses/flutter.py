@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Optional
 
 from ..case.analysis import register_analysis
@@ -24,6 +23,7 @@ from ..case.flow import WHOLE
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, label_of
 from ..columns import FLUTTER
+from ..cyclic.engine_order import folded
 from ..errors import InputError
 from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
@@ -33,6 +33,7 @@ from .parts.at_rest import flutter_at_rest
 from .parts.branch import continuation, finished_table, mode_problem, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.fed_modes import fed_modes
+from .parts.flutter_wave import in_wave_of, raise_if_all, what_to_do, why_not
 from .parts.observed import named
 from .parts.others import with_others
 from .parts.rest import keep_pairs, rest_state, retained, start_mode, stuck_or_free
@@ -107,11 +108,15 @@ class FlutterAnalysis(HarmonicSection):
             report.wrong(
                 ("wheel",), "is for modes; flutter follows waves on one sector", "one sector", "remove the key"
             )
+        if "aerodynamics" in self.model_fields_set and not self.aerodynamics:
+            fix = 'remove the key, or take `type = "mode"`'
+            report.wrong(("aerodynamics",), "is off, and flutter is of the flow", "the forces of the flow", fix)
         half = sectors // 2
         for index, diameters in enumerate(self.nodal_diameters or []):
             if abs(diameters) > half:
                 expected = f"-{half} .. {half}, negative for backward waves"
-                report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, "take it out")
+                fix = f"write {folded(diameters, sectors)}, the same wave, or take it out"
+                report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, fix)
         section = facts.flow
         if section is None or section.damping is None:
             return
@@ -151,18 +156,22 @@ def _all_waves(
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("wave_number", 0))
     stopped = stopped_before(own)
+    cannot: dict[int, InputError] = {}
     with context.console.progress(context.name):
         for number in range(first, len(diameters)):
             wave = _Wave(context, diameters, number, harmonics)
             why = wave.follow(writer, snapshot, found and number == first, stopped)
             stopped.update({number: why} if why else {})
+            cannot.update({wave.diameter: wave.cannot} if wave.cannot else {})
+    raise_if_all(cannot, diameters)
     status, reason, ended = ending_of(stopped, diameters)
     table = finished_table(writer)
     waves = context.comm.bcast(describe_waves(table, diameters) if table else [])
     for wave in waves:
         wave["limit_cycles"] = _beside_other_families(context, wave["nodal_diameter"], wave["limit_cycles"])
     cycles = [cycle for wave in waves for cycle in wave["limit_cycles"]]
-    _write(context, waves, cycles)
+    if waves:  # before the first point there is no folder to write to
+        _write(context, waves, cycles)
     if table:
         keep_pairs(context, writer)
     writer.close(status, reason, events=json.dumps(cycles), waves=json.dumps(waves), **ended)
@@ -170,7 +179,8 @@ def _all_waves(
     unit = context.units("length")
     summary = [f"{context.name}: {words(wave, unit)}" for wave in waves]
     goal = f"amplitude {context.analysis.amplitude[1]:g} {unit} in every wave"
-    return Outcome(writer.rows, reason, not stopped, summary, goal)
+    advice = what_to_do(context.name, cannot, diameters)
+    return Outcome(writer.rows, reason, not stopped, summary, goal, advice)
 
 
 def _beside_other_families(
@@ -179,25 +189,13 @@ def _beside_other_families(
     """A wave's limit cycles with the families that grow beside a stable one. Collective."""
     if not any(cycle["stable"] for cycle in cycles):
         return list(cycles)
-    with _in_wave(context, diameter) as own_context:
+    with in_wave_of(context, diameter) as own_context:
 
         def fed() -> list[dict[str, Any]]:
             rest_state(own_context)
             return fed_modes(own_context, stuck_or_free(own_context, context.analysis.linear_mode))
 
         return with_others(fed, cycles)
-
-
-@contextmanager
-def _in_wave(context: AnalysisContext[FlutterAnalysis], diameter: int) -> Iterator[AnalysisContext[FlutterAnalysis]]:
-    """The context of one nodal diameter, with its model under the flow. Collective."""
-    from ..case.build import build_model
-
-    case, wave = context.case, {"nodal_diameter": diameter, "aerodynamics": True}
-    analysis = context.analysis.model_copy(update=wave)
-    preload = case.preload_of(analysis)
-    with build_model(case, analysis.dampers, context.comm, preload, diameter, aerodynamics=True) as model:
-        yield context.of(analysis, model=model)
 
 
 class _Wave:
@@ -213,14 +211,19 @@ class _Wave:
         self.context, self.number, self.count, self.harmonics = context, number, len(diameters), harmonics
         self.diameter = diameters[number]
         self.analysis = context.analysis
+        self.cannot: Optional[InputError] = None  #: why it cannot begin
 
     def follow(
         self, writer: AnalysisWriter, snapshot: Optional[dict[str, Any]], go_on: bool, earlier: Mapping[int, str]
     ) -> str:
         """Write its points, with what earlier waves stopped for; returns why it did, or nothing. Collective."""
         analysis = self.analysis
-        with _in_wave(self.context, self.diameter) as own_context:
-            problem = self._problem(own_context)
+        with in_wave_of(self.context, self.diameter) as own_context:
+            try:
+                problem = self._problem(own_context)
+            except InputError as error:  # on all ranks; other waves may begin
+                self.cannot = error
+                return why_not(self.diameter, error)
             name = f"{self.context.name}: nodal diameter {self.diameter}"
             low, high = analysis.amplitude
             branch = continuation(own_context, problem, (low, high), analysis.report_at, snapshot, go_on, name)
@@ -253,7 +256,7 @@ def _write(
     context: AnalysisContext[FlutterAnalysis], waves: Sequence[Mapping[str, Any]], cycles: Sequence[Mapping[str, Any]]
 ) -> None:
     """``<name>_waves.csv``, a line for each nodal diameter, and ``<name>_crossings.csv``, one for each limit cycle."""
-    names = [name for name in waves[0] if name != "limit_cycles"] if waves else []
+    names = [name for name in waves[0] if name != "limit_cycles"]
     context.write_table("waves", {name: [wave[name] for wave in waves] for name in names})
     plain = [{**cycle, "stable": STABLE[cycle["stable"]]} for cycle in cycles]
     for cycle in plain:

@@ -19,12 +19,12 @@ from ...model.sectors import in_wave
 from ...post.contact_history import normal_force
 from ...post.slip_threshold import lasting_factors, slip_factors
 from .context import AnalysisContext
-from .observed import observed_by
+from .flutter_wave import in_wave_of, raise_if_all, without_those
+from .observed import normalised_amplitude, observed_by
 from .rest import loaded_state, start_mode
 from .wheel_start import Start, start_of
 
 if TYPE_CHECKING:
-    from ...hb.observed import Observed
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ..flutter import FlutterAnalysis
@@ -70,7 +70,7 @@ def mode_at_rest(context: AnalysisContext[ModeAnalysis]) -> Told:
     if not context.case.contacts:
         return [], []
     states, start, seconds = _solved(context)
-    slip = first_slip(context, states, start.mode, observed_amplitude(context, start.dof, start.mode))
+    slip = first_slip(context, states, start.mode, normalised_amplitude(context, start.dof, start.mode))
     seen = start.attributes.get("normalise", label_of(context.analysis.normalise))
     lines = [rest_line(context, states, seconds), stuck_line(context, start.mode)]
     if with_flow_forces(context.analysis):
@@ -80,27 +80,34 @@ def mode_at_rest(context: AnalysisContext[ModeAnalysis]) -> Told:
 
 def flutter_at_rest(context: AnalysisContext[FlutterAnalysis], diameters: Sequence[int]) -> Told:
     """The same of every wave of a flutter analysis, the state at rest once. Collective."""
-    from ...case.build import build_model
-
     if not context.case.contacts:
         return [], []
     lines: list[str] = []
     slips = []
+    cannot: dict[int, InputError] = {}
     for diameter in diameters:
-        analysis = context.analysis.model_copy(update={"nodal_diameter": diameter, "aerodynamics": True})
-        preload = context.case.preload_of(analysis)
-        with build_model(context.case, analysis.dampers, context.comm, preload, diameter, aerodynamics=True) as model:
-            wave = context.of(analysis, model=model)
-            states, mode, rest, seconds = rest_and_mode(wave)
-            seen = observed_by(wave, analysis.normalise, mode)
-            slip = first_slip(wave, states, mode, observed_amplitude(wave, seen, mode))
+        with in_wave_of(context, diameter) as wave:
+            try:
+                states, mode, seconds, slip = _wave_at_rest(wave)
+            except InputError as error:  # on all ranks; the run goes on with the other waves
+                cannot[diameter] = error
+                continue
         lines = lines or [rest_line(context, states, seconds)]
         found = f"{mode.frequency_hz:.6g} Hz{_beside_flow(context, mode)}"
         lines.append(f"nodal diameter {diameter}: {found}, {_slip_lines(wave, slip)[0]}")
         slips.append(slip)
+    raise_if_all(cannot, diameters)
     known = [slip for slip in slips if slip is not None]
     least = min(known, key=lambda slip: slip.lasting) if len(known) == len(slips) and known else None
-    return lines, _never_slips(context, least)
+    return lines, without_those(context.name, cannot, diameters) + _never_slips(context, least)
+
+
+def _wave_at_rest(
+    wave: AnalysisContext[FlutterAnalysis],
+) -> tuple[States, LinearMode, float, Optional[FirstSlip]]:
+    states, mode, _, seconds = rest_and_mode(wave)
+    seen = observed_by(wave, wave.analysis.normalise, mode)
+    return states, mode, seconds, first_slip(wave, states, mode, normalised_amplitude(wave, seen, mode))
 
 
 def rest_and_mode(context: AnalysisContext[Any]) -> tuple[States, LinearMode, Optional[Rest], float]:
@@ -151,14 +158,6 @@ def _beside_flow(context: AnalysisContext[Any], mode: LinearMode) -> str:
         return ""
     times = section.frequency / mode.frequency_hz
     return f" (the flow's forces hold at {section.frequency:g} Hz: {times:.3g} times their damping)"
-
-
-def observed_amplitude(context: AnalysisContext[Any], seen: Observed, mode: LinearMode) -> float:
-    """What an analysis sees of a linear motion as it is scaled. Collective."""
-    from ...hb.observed import row_of
-
-    phi = mode.shape + 1j * mode.imaginary
-    return float(abs(sum(weight * phi[dof] for dof, weight in row_of(context.model, seen))))
 
 
 def first_slip(context: AnalysisContext[Any], states: States, mode: LinearMode, unit: float) -> Optional[FirstSlip]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import ObservedTable, label_of, unit_of
 from ...columns import Column, columns_named, over
+from ...errors import InputError
 from ...results.analysis import ROW
 from ...results.results import AnalysisWriter
 from .context import AnalysisContext
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from ...hb.observed import Observed
     from ...model.model import Model
     from ...model.modes import LinearMode
+
+#: Share of the largest displacement below which a motion is rounding.
+STANDS_STILL = 1e-10
 
 
 def observed_by(
@@ -40,6 +44,38 @@ def observed_by(
     if given.mode is None:
         return row_on(case, given)
     return start if given.mode == context.analysis.linear_mode else stuck_or_free(context, given.mode)
+
+
+def observed_amplitude(context: AnalysisContext[AnalysisSection], seen: Observed, mode: LinearMode) -> float:
+    """What an analysis sees of a linear motion as it is scaled. Collective."""
+    from ...hb.observed import row_of
+
+    phi = mode.shape + 1j * mode.imaginary
+    return float(abs(sum(weight * phi[dof] for dof, weight in row_of(context.model, seen))))
+
+
+def normalised_amplitude(context: AnalysisContext[Any], seen: Observed, mode: LinearMode) -> float:
+    """The same of what is to be normalised. Collective.
+
+    Raises
+    ------
+    InputError
+        It does not move, as the core has it when the branch is to begin (`NonlinearMode`).
+    """
+    from ...hb.observed import row_of
+
+    heaviest = max((abs(weight) for _, weight in row_of(context.model, seen)), default=0.0)
+    largest = heaviest * max(np.abs(mode.shape).max(), np.abs(mode.imaginary).max())
+    amplitude = observed_amplitude(context, seen, mode)
+    if amplitude < STANDS_STILL * largest:
+        raise InputError(
+            "what is normalised does not move in the starting mode",
+            f"analysis '{context.name}', normalised by {label_of(context.analysis.normalise)}",
+            f"{amplitude / largest:.6g} of the largest displacement",
+            f"> {STANDS_STILL:g}",
+            "normalise on a dof or row that takes part in the mode",
+        )
+    return amplitude
 
 
 def row_on(case: Case, given: ObservedTable) -> Array:

@@ -24,14 +24,13 @@ from .at_rest import (
     States,
     Told,
     first_slip,
-    observed_amplitude,
     place_of,
     rest_and_mode,
     rest_line,
     stuck_line,
 )
 from .excitation import wave_of_forces
-from .observed import observed_by
+from .observed import observed_amplitude, observed_by
 from .rest import loaded_state
 from .tuned import nearest_modes, tuned_sector
 

@@ -149,18 +149,26 @@ def start_mode(context: AnalysisContext[AnalysisSection], linear_mode: int) -> t
         return context.numbered(context.linear_mode("free", linear_mode), linear_mode), rest
     start = context.numbered(modes, linear_mode)
     if start.omega <= RIGID * closed_mode(context).omega:
-        is_open = 1.0 if rest is None else rest.open
-        load_name = own_load(context.case.contacts)
-        by = f"{load_name}, or " if load_name else ""
-        raise InputError(
-            f"linear mode {linear_mode} is a rigid motion: nothing holds the structure at rest",
-            where=f"analysis '{context.name}'",
-            measured=f"{start.frequency_hz:.3g} Hz, dof {_leader(context, start)} moves most,"
-            f" {100 * is_open:.3g} % of the pairs open at rest",
-            expected="an elastic mode",
-            fix=f"load the contact ({by}[preload] loads), hold the structure, or take a higher linear_mode",
-        )
+        raise _rigid(context, linear_mode, start, rest)
     return start, rest
+
+
+def _rigid(
+    context: AnalysisContext[AnalysisSection], number: int, mode: LinearMode, rest: Optional[Rest]
+) -> InputError:
+    """What is wrong where a linear mode is a rigid motion; contact that can open may lack a load. Collective."""
+    measured, fix = f"{mode.frequency_hz:.3g} Hz, dof {_leader(context, mode)} moves most", "hold the structure"
+    if any(contact.info.normal is not None for contact in context.case.contacts):
+        measured += f", {100 * (rest or loaded_state(context)).open:.3g} % of the pairs open at rest"
+        load_name = own_load(context.case.contacts)
+        fix = f"load the contact ({f'{load_name}, or ' if load_name else ''}[preload] loads), {fix}"
+    return InputError(
+        f"linear mode {number} is a rigid motion: nothing holds the structure at rest",
+        f"analysis '{context.name}'",
+        measured,
+        "an elastic mode",
+        f"{fix}, or take a higher linear_mode",
+    )
 
 
 def _leader(context: AnalysisContext[AnalysisSection], mode: LinearMode) -> str:
