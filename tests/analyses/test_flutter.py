@@ -328,7 +328,12 @@ def test_the_flow_can_be_set_from_the_command_line(write):
 WRONG = {
     "no flow": (TEXT[TEXT.index("[aero") : TEXT.index("[[analysis]]")], "", "needs forces of the flow"),
     "one wave": ("harmonics = 1", "harmonics = 1\nnodal_diameter = 1", r"nodal_diameters = \[1\]"),
-    "too many": ("harmonics = 1", "harmonics = 1\nnodal_diameters = [1, 3]", "no wave of this wheel"),
+    "too many": (
+        "harmonics = 1",
+        "harmonics = 1\nnodal_diameters = [1, 3]",
+        "(?s)no wave of this wheel.*write -2, the same",
+    ),
+    "no flow wanted": ("harmonics = 1", "harmonics = 1\naerodynamics = false", "flutter is of the flow"),
     "wheel": ("harmonics = 1", "harmonics = 1\nwheel = true", "follows waves on one sector"),
     "no coefficients": ("influence =", "damping =", "wrong value"),
     "both": ('dof = "mass"', 'dof = "mass"\ndamping = { 1 = 0.01 }', "given beside each other"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..cyclic.engine_order import folded
 from ..errors import InputError
 from ..model.structure import Structure
 from ..texts import nearest
@@ -27,12 +28,14 @@ def check_wave(report: Reporter, analysis: HarmonicSection, facts: Facts) -> Non
             fix = "remove the key, or give [model] its sectors"
             about(report, "nodal_diameter", "is of no sector of a wheel", "a model with sectors", fix)
         return
-    half = facts.neighbours.sectors // 2
+    sectors = facts.neighbours.sectors
+    half = sectors // 2
     if analysis.integrates() or (abs(given) <= half if given is not None else analysis.mistuning is not None):
         return
-    what = "says no nodal diameter" if given is None else "has no such nodal diameter"
-    expected = f"-{half} .. {half}, negative for backward waves"
-    about(report, "nodal_diameter", what, expected, "add for example `nodal_diameter = 1`")
+    what, fix = "says no nodal diameter", "add for example `nodal_diameter = 1`"
+    if given is not None:
+        what, fix = "has no such nodal diameter", f"write `nodal_diameter = {folded(given, sectors)}`, the same wave"
+    about(report, "nodal_diameter", what, f"-{half} .. {half}, negative for backward waves", fix)
 
 
 def with_measured(report: Reporter, analysis: AnalysisSection, facts: Facts) -> AnalysisSection:
