@@ -175,6 +175,14 @@ def test_waves_that_grow_beside_a_cycle_of_the_wheel_are_those_of_the_closed_for
     assert "nodal diameters, " in log and "all sectors alike" in log
 
 
+def test_double_modes_of_sectors_that_deviate_alike_are_told(write, shared_tmp, comm):
+    """Without the flow both waves of a nodal diameter are one mode: no branch begins in a sum of them."""
+    alike = ("aerodynamics = true", f"mistuning = {{ deviations = {[0.0] * SECTORS} }}")
+    path = write((TEXT[TEXT.index("[[analysis]]") :], WHEEL), alike, ("harmonics = 1", "harmonics = 3"))
+    with pytest.raises(fw.NotConverged, match="remove `mistuning`.*differ by 0"):
+        run_case(path, RunOptions(out=shared_tmp / "alike", plots=False), comm)
+
+
 def stuck_wave(diameters, ground, next_one, flow):
     """lambda of a mass while all pairs stick, lambda^2 + c lambda + k = 0: springs to the ground and to both others."""
     theta = 2 * np.pi * diameters / SECTORS

@@ -42,7 +42,7 @@ from .parts.context import AnalysisContext, Outcome
 from .parts.observed import keep_row, named
 from .parts.others import fed_beside, with_others
 from .parts.rest import keep_pairs, retained
-from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
+from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, nearly_tuned, one_by_one
 from .parts.wheel_start import Start, start_of, uneven_samples
 
 if TYPE_CHECKING:
@@ -240,8 +240,10 @@ def _finish(
         keep_pairs(context, writer)
         keep_row(context, writer, context.analysis.normalise, problem.row)
     writer.close("done" if branch.converged else "stopped", branch.reason, events=json.dumps(cycles))
-    folded = table and context.case.wheel is not None and not branch.converged
-    advice = one_by_one(table, context.units("length")) if folded else ""
+    advice = ""
+    if context.case.wheel is not None and not branch.converged:
+        folded = one_by_one(table, context.units("length")) if table else ""
+        advice = folded or nearly_tuned(context.wheel.deviations)
     return Outcome(writer.rows, branch.reason, branch.converged, summary, advice=advice)
 
 

@@ -46,6 +46,8 @@ WHEEL = (
 
 #: Participation ratio above which all sectors move alike, to rounding: amplitudes differ by 1e-6 of themselves.
 ALIKE = 1 - 1e-12
+#: Deviations of sectors that differ by less hardly part the two modes of a double one.
+NEARLY_TUNED = 1e-6
 #: A force on the avoided mode above this share of the inertia force is no rounding.
 HELD = 1e-8
 
@@ -181,4 +183,18 @@ def one_by_one(table: dict[str, Any], unit: str) -> str:
         f"{near} folds lie within {100 * SAME_AMPLITUDE:g} % of a = {middle:.4g} {unit}: sectors that move almost alike"
         " begin to slip one after another, each with a fold of its own; begin above this amplitude, deviate more, or"
         " follow a travelling wave"
+    )
+
+
+def nearly_tuned(deviations: npt.NDArray[np.float64] | None) -> str:
+    """Advice on a branch of a wheel whose given deviations leave its modes double; empty where they do not.
+
+    The equations of a tuned wheel hold its double modes apart by a force that comes out as zero; those of a mistuned
+    one do not, and every combination of two waves is a mode of theirs while the contact sticks.
+    """
+    if deviations is None or np.ptp(deviations) >= NEARLY_TUNED:
+        return ""
+    return (
+        "remove `mistuning`, for a wave of the tuned wheel (wave = ...): deviations differ by"
+        f" {np.ptp(deviations):.1g}, and modes that are double are no one branch; or deviate more"
     )
