@@ -175,6 +175,21 @@ def test_waves_that_grow_beside_a_cycle_of_the_wheel_are_those_of_the_closed_for
     assert "nodal diameters, " in log and "all sectors alike" in log
 
 
+@pytest.mark.parametrize("diameters", [1, -1, 2, -2])
+def test_a_mode_of_the_mistuned_wheel_runs_as_the_wave_that_is_asked_for(write, shared_tmp, comm, diameters):
+    """Where the flow parts both waves of a nodal diameter further than the deviations do."""
+    changes = (
+        ("nodal_diameter = 1", f"nodal_diameter = {diameters}\nmistuning = {{ standard_deviation = 1e-5 }}"),
+        ("amplitude = [0.5, 20.0]", "amplitude = [0.05, 0.1]"),
+    )
+    out = shared_tmp / "asked"
+    path = write((TEXT[TEXT.index("[[analysis]]") :], WHEEL), *changes)
+    assert run_case(path, RunOptions(out=out, plots=False), comm) == 0
+    first, expected = table(out, "wheel")[0], stuck_wave(diameters, 1.0, 2.0, True)
+    assert int(first["diameters"]) == diameters
+    assert complex(-float(first["beta"]), float(first["omega"])) == pytest.approx(expected, rel=1e-4)
+
+
 def test_double_modes_of_sectors_that_deviate_alike_are_told(write, shared_tmp, comm):
     """Without the flow both waves of a nodal diameter are one mode: no branch begins in a sum of them."""
     alike = ("aerodynamics = true", f"mistuning = {{ deviations = {[0.0] * SECTORS} }}")

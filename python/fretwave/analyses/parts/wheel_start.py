@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import scipy.sparse as sp
 
 from ...arrays import Complex
-from ...case.harmonic import nodal_diameter
+from ...case.harmonic import nodal_diameter, with_flow_forces
 from ...case.observed import dof_of
 from ...post.largest import largest
 from .asymptotes import most_like, other_asymptote
 from .context import AnalysisContext
+from .fed_modes import motions, shapes_of
+from .gyroscopic import TOLD, gyroscopic_shift
 from .observed import observed_by
 from .rest import modes_or_free, rest_state, start_mode, stuck_or_free
 from .tuned import nearest_modes, nearest_or_free, tuned_sector
@@ -27,6 +30,10 @@ if TYPE_CHECKING:
 
 #: Families of the tuned sector looked through for that of a wheel's mode, beyond its number over N.
 MORE_FAMILIES = 3
+#: A motion with so many times the share of one wave than of that which runs the other way runs with it.
+RUNS = 1.1
+#: Motions whose shares in a wave differ by less are alike in it.
+ALIKE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -170,7 +177,7 @@ def _largest(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> int:
     """Sector in which the normalised dof moves most."""
     analysis = context.analysis
     dof = context.tuned.dof(dof_of(analysis.normalise))
-    return largest(np.abs(context.wheel.by_sector(mode.shape)[:, dof]))
+    return largest(np.abs(context.wheel.by_sector(mode.shape + 1j * mode.imaginary)[:, dof]))
 
 
 def _most_alike(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> LinearMode:
@@ -181,7 +188,29 @@ def _most_alike(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> Li
     analysis = context.analysis
     wheel = context.wheel
     wave = wave_mode(tuned, nodal_diameter(analysis), wheel.sectors)
-    return most_alike(nearest_or_free(context, tuned.omega, wheel.sectors), wave, context.case.M)
+    modes = nearest_or_free(context, tuned.omega, wheel.sectors)
+    standing = most_alike(modes, wave, context.case.M)
+    C = context.case.damped(analysis.dampers).C
+    parted = with_flow_forces(analysis) or gyroscopic_shift(modes, C) > TOLD
+    return _running(context, modes, wave, standing) if parted else standing
+
+
+def _running(
+    context: AnalysisContext[ModeAnalysis], modes: Sequence[LinearMode], wave: LinearMode, standing: LinearMode
+) -> LinearMode:
+    """A mode turned into the motion that the flow and gyroscopic forces make of it, if that runs as the wave does.
+
+    They part the waves that run forward and backward, of which an undamped mode has as much of the one as of the other,
+    unless the deviations part the standing ones further.
+    """
+    phi, (_, shares, own) = shapes_of(modes), motions(context, modes)
+    motion, along = phi @ shares[:, own], wave.shape + 1j * wave.imaginary
+    forward, backward = (np.abs(one @ (context.case.M @ motion)) ** 2 for one in (along.conj(), along))
+    best = largest(forward, ALIKE)
+    if forward[best] <= RUNS * backward[best]:
+        return standing
+    found = motion[:, best]
+    return replace(standing, shape=found.real.copy(), imaginary=found.imag.copy())
 
 
 def _free(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> dict[str, float]:
