@@ -10,6 +10,9 @@ import numpy as np
 from .arrays import Array
 from .errors import InputError
 
+#: Of a number whose square is taken; norms sum squares.
+LARGEST = 1e150
+
 
 def whole(value: object) -> int | None:
     """The whole number that it is, NumPy's too; None of any other thing."""
@@ -30,6 +33,19 @@ def place(name: str, value: object, count: int) -> int:
     if found is None or not 0 <= found < count:
         raise InputError(f"there is no such {name}", None, repr(value), f"0 to {count - 1}", "choose one of these")
     return found
+
+
+def with_a_square(what: str, value: float, fix: str) -> None:
+    """Its square is a number, and not zero unless it is zero itself.
+
+    Raises
+    ------
+    InputError
+    """
+    size = abs(value)
+    if size > LARGEST or 0 < size < 1 / LARGEST:
+        how, bound = ("large", f"at most {LARGEST:g}") if size > 1 else ("small", f"at least {1 / LARGEST:g}")
+        raise InputError(f"{what} is too {how}", None, f"{value:g}", f"{bound}, whose square is a number", fix)
 
 
 def positive(name: str, value: object) -> float:

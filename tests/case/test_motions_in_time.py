@@ -62,3 +62,10 @@ def test_too_few_periods_for_a_verdict_are_refused() -> None:
     load_case(CASE, ["limit_cycle.periods=12"])
     [problem] = problems("limit_cycle.periods=11")
     assert problem.what == "limit_cycle.periods is too few for a verdict" and problem.fix
+
+
+@pytest.mark.parametrize("key", ["forced.levels", "mode.amplitude", "free_decay.amplitude", "limit_cycle.amplitude"])
+def test_a_motion_has_a_size_whose_square_is_a_number(key: str) -> None:
+    """A level of 1e155 ended in Python's own error, an amplitude of that as a mode that sticks."""
+    found = problems(f"{key}=[1.0, 1e155]")
+    assert "<= 1e+150" in str(found[0].expected) and found[0].fix

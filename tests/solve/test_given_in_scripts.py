@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tolerances import SOLVED
 
 import fretwave as fw
 
@@ -45,6 +46,45 @@ def test_a_force_has_whole_orders(force: Any, mode: fw.NonlinearMode) -> None:
     """Python's own errors came out."""
     with pytest.raises(fw.InputError, match=r"no harmonics[\s\S]*whole orders"):
         fw.ForcedResponse(mode.model, mode.harmonics, force, 1.0, 0, mode.start)
+
+
+@pytest.mark.parametrize("level", [np.nan, np.inf, -np.inf, None, "1", [1.0, 2.0]], ids=str)
+def test_a_level_is_a_finite_number(level: Any, mode: fw.NonlinearMode) -> None:
+    """The excitation was said to be zero."""
+    with pytest.raises(fw.InputError, match=r"cannot be used[\s\S]*level[\s\S]*a finite number"):
+        fw.ForcedResponse(mode.model, mode.harmonics, {1: [1.0, 0.0]}, level, 0, mode.start)
+
+
+@pytest.mark.parametrize("size", [1e155, 1e200, 1e308])
+def test_what_has_no_square_is_refused(size: float, mode: fw.NonlinearMode) -> None:
+    """Responses and states at rest were nan, modes stuck, and all of them converged."""
+    force = {1: [1.0, 0.0]}
+    with pytest.raises(fw.InputError, match=r"excitation is too large[\s\S]*whose square is a number"):
+        fw.ForcedResponse(mode.model, mode.harmonics, force, size, 0, mode.start)
+    with pytest.raises(fw.InputError, match=r"excitation is too small[\s\S]*whose square is a number"):
+        fw.ForcedResponse(mode.model, mode.harmonics, force, 1 / size, 0, mode.start)
+    with pytest.raises(fw.InputError, match=r"too large[\s\S]*whose square is a number"):
+        fw.static_preload(mode.model, [size, 0.0])
+    with pytest.raises(fw.InputError, match=r"end of the branch is too large[\s\S]*whose square is a number"):
+        fw.follow(mode, 0.1 * size, size)
+
+
+def test_what_has_a_square_is_scaled_alone(mode: fw.NonlinearMode) -> None:
+    """Nothing slips at 1e-100 N, all slips at 1e100 N."""
+    for level, law in ((1e-100, "stuck"), (1e100, "free")):
+        linear = fw.linear_modes(mode.model, 1, contact=law)[0]
+        response = fw.ForcedResponse(mode.model, mode.harmonics, {1: [1.0, 0.0]}, level, 0, mode.start)
+        found = fw.follow(response, 0.5 * linear.omega, 0.6 * linear.omega)[0]
+        Kc = K + np.diag([0.0, 40.0 * (law == "stuck")])
+        expected = np.linalg.solve(Kc - found["omega"] ** 2 * M, [level, 0.0])[0]
+        assert found["amplitude"] == pytest.approx(expected, rel=SOLVED)
+
+
+def test_an_order_may_be_any_whole_number(mode: fw.NonlinearMode) -> None:
+    """Of True, which is 1, Python's own error came out."""
+    for order in (1, np.int64(1), True):
+        response = fw.ForcedResponse(mode.model, mode.harmonics, {order: [1.0, 0.0]}, 1.0, 0, mode.start)
+        assert response.amplitude_scale(mode.initial(0.1)) > 0
 
 
 @pytest.mark.parametrize("load", [[0.0, np.nan], [np.inf, 0.0], [0.0, 1.0 + 1.0j], [1.0], 1.0, None], ids=str)

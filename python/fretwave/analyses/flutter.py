@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional
 
 from ..case.analysis import register_analysis
 from ..case.checks_common import about
-from ..case.fields import Positive, Whole, key
+from ..case.fields import Positive, Size, Whole, key
 from ..case.flow import WHOLE
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, label_of
@@ -60,9 +60,7 @@ class FlutterAnalysis(HarmonicSection):
         "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
     )
     normalise: Observed = key("dof whose fundamental harmonic is the modal amplitude; or weighted dofs", example='"m1"')
-    amplitude: list[Positive] = key(
-        "first and last modal amplitude", "length", "[1e-5, 1e-2]", min_length=2, max_length=2
-    )
+    amplitude: list[Size] = key("first and last modal amplitude", "length", "[1e-5, 1e-2]", min_length=2, max_length=2)
     nodal_diameters: Optional[list[Whole]] = key(
         "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 import numpy as np
 
 from ..case.analysis import register_analysis
-from ..case.fields import Dof, Frequency, Positive, Speed, Whole, key
+from ..case.fields import Dof, Frequency, Positive, Size, Speed, Whole, key
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, given_to, label_of, unit_of
 from ..case.toml.validation import at
@@ -79,7 +79,7 @@ class ForcedAnalysis(HarmonicSection):
         example="4",
         default=None,
     )
-    levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
+    levels: list[Size] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
     frequency: list[Frequency] = key(
         "first and last excitation frequency", "Hz", "[3.0, 5.0]", min_length=2, max_length=2
     )

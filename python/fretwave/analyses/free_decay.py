@@ -10,7 +10,7 @@ import numpy as np
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.analysis_tables import Damper
 from ..case.checks_common import check_once
-from ..case.fields import Positive, Whole, key
+from ..case.fields import Positive, Size, Whole, key
 from ..case.observed import check_displaced
 from ..columns import Column
 from ..errors import InputError
@@ -37,7 +37,7 @@ class TransientSection(AnalysisSection):
     """Keys of the analyses by direct time integration."""
 
     mode: str = key("mode analysis to start from and compare with", example='"mode"')
-    amplitude: list[Positive] = key("start amplitudes", "length", "[0.05, 0.3, 2.5]", min_length=1)
+    amplitude: list[Size] = key("start amplitudes", "length", "[0.05, 0.3, 2.5]", min_length=1)
     periods: Whole = key("vibration periods to integrate", example="30", ge=1)
     samples_per_period: Whole = key("output samples of a period", example="64", default=64, ge=8)
     tolerance: Positive = key(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, cast
 
 from ..case.analysis import register_analysis
 from ..case.checks_wheel import check_needs_wheel
-from ..case.fields import Positive, key
+from ..case.fields import Positive, Size, key
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of, unit_of
 from ..columns import ENERGY, MODE
@@ -77,7 +77,7 @@ class ModeAnalysis(HarmonicSection):
         "dof whose fundamental harmonic is the modal amplitude; or weighted dofs, or a linear mode's coordinate",
         example='"m1"',
     )
-    amplitude: list[Positive] = key(
+    amplitude: list[Size] = key(
         "first and last modal amplitude", "length, or sqrt(mass) length", "[0.02, 3.0]", min_length=2, max_length=2
     )
     report_at: list[Positive] = key(

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..case.analysis import AnalysisSection, register_analysis
-from ..case.fields import Positive, key
+from ..case.fields import Size, key
 from ..case.schema import PreloadSection
 from ..columns import Column
 from ..errors import InputError, NotConverged
@@ -50,7 +50,7 @@ class StaticAnalysis(AnalysisSection):
     summary = STATES_AT_REST
 
     type: Literal["static"]
-    factors: list[Positive] = key("factors on the loads of the preload", "-", "[0.5, 1.0]", default=[1.0], min_length=1)
+    factors: list[Size] = key("factors on the loads of the preload", "-", "[0.5, 1.0]", default=[1.0], min_length=1)
     preload: Optional[PreloadSection] = key(
         "in place of [preload]", example='{ loads = ["centrifugal"] }', default=None
     )

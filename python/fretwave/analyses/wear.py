@@ -19,7 +19,7 @@ from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_common import check_once
 from ..case.checks_size import harmonic_memory
 from ..case.contacts import wear_areas as areas_of
-from ..case.fields import Positive, Whole, key
+from ..case.fields import Positive, Size, Whole, key
 from ..case.observed import check_displaced, label_of
 from ..errors import FretwaveError, InputError
 from ..files.dimensions import names_of_data
@@ -55,7 +55,7 @@ class WearAnalysis(AnalysisSection):
 
     type: Literal["wear"]
     mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')
-    amplitude: list[Positive] = key("fixed modal amplitudes, one or a grid", "length", "[1.2e-3]", min_length=1)
+    amplitude: list[Size] = key("fixed modal amplitudes, one or a grid", "length", "[1.2e-3]", min_length=1)
     cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
     coefficient: float = key("wear coefficient k_w", "1/pressure", "1e-14", ge=0, allow_inf_nan=False)
     cycle_unit: Optional[Positive] = key(

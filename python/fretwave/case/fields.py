@@ -7,6 +7,7 @@ from typing import Annotated, Any, Union
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticKnownError
 
+from ..given import LARGEST
 from ..units import SYSTEMS
 
 #: Longest name: results are files of that name, whose systems allow 255 characters with all that is added.
@@ -34,6 +35,8 @@ Dof = Annotated[
 UnitName = Annotated[str, WithJsonSchema({"type": "string", "enum": list(SYSTEMS)})]
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+#: Of a motion or what drives it, with a square that is a number.
+Size = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 #: In Hz: equations have its square, times that of an order.
 Frequency = Annotated[float, Field(gt=0, le=1e100)]
 #: In rev/min: stiffness and loads have the square of two such in proportion.

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
+from ..given import LARGEST
 from .sectors import Sparse
 
 #: Largest entry of A - A^T over the largest entry of A that still counts as rounding.
@@ -16,10 +17,6 @@ SYMMETRY_TOLERANCE = 1e-10
 
 #: Eigenvalues of the diagonally scaled matrix below this (over the largest) count as zero.
 SINGULAR_TOLERANCE = 1e-13
-
-
-#: Of a matrix; norms sum squares.
-LARGEST_ENTRY = 1e150
 
 
 #: Up to this size definiteness is decided by a dense eigenvalue problem.
@@ -33,10 +30,10 @@ NAMES = {"M": "mass matrix", "K": "stiffness matrix", "C": "damping matrix", "B"
 
 def check_entries(letter: str, A: Sparse, where: str) -> InputError | None:
     """Every entry is a number whose square is one."""
-    if max(A.data.max(initial=0.0), -A.data.min(initial=0.0)) <= LARGEST_ENTRY:
+    if max(A.data.max(initial=0.0), -A.data.min(initial=0.0)) <= LARGEST:
         return None
     entries = A.tocoo()
-    bad = np.flatnonzero(~(abs(entries.data) <= LARGEST_ENTRY))
+    bad = np.flatnonzero(~(abs(entries.data) <= LARGEST))
     if not len(bad):
         return None
     row, column, value = int(entries.row[bad[0]]), int(entries.col[bad[0]]), float(entries.data[bad[0]])
@@ -45,7 +42,7 @@ def check_entries(letter: str, A: Sparse, where: str) -> InputError | None:
         f"the {NAMES[letter]} has an entry that is {'too large' if finite else 'not a number'}",
         where=where,
         measured=f"{letter}[{row}][{column}] = {value}" + (f", and {len(bad) - 1} more" if len(bad) > 1 else ""),
-        expected=f"at most {LARGEST_ENTRY:g}, whose square is a number" if finite else "finite entries",
+        expected=f"at most {LARGEST:g}, whose square is a number" if finite else "finite entries",
         fix="choose other units" if finite else "look at what wrote this entry",
     )
 
@@ -97,12 +94,12 @@ def check_mass(M: Sparse, where: str, dofs: Sequence[str]) -> InputError | None:
             expected="> 0 for every dof",
             fix="correct the sign" if diagonal[worst] < 0 else fix,
         )
-    if diagonal[worst] < 1 / LARGEST_ENTRY:
+    if diagonal[worst] < 1 / LARGEST:
         return InputError(
             "the mass matrix has a diagonal entry that is too small",
             where=where,
             measured=f"M[{worst}][{worst}] = {diagonal[worst]:g} (dof {dofs[worst]})",
-            expected=f"at least {1 / LARGEST_ENTRY:g}, whose square is a number",
+            expected=f"at least {1 / LARGEST:g}, whose square is a number",
             fix="choose other units",
         )
     smallest, shape = smallest_eigenvalue(M)
@@ -129,13 +126,13 @@ def check_stiffness(
     note : str or None
         Said when only the contact holds the structure.
     """
-    if 0 < abs(K).max() < 1 / LARGEST_ENTRY:
+    if 0 < abs(K).max() < 1 / LARGEST:
         return (
             InputError(
                 "the stiffness matrix is too small",
                 where=where,
                 measured=f"its largest entry is {abs(K).max():g}",
-                expected=f"at least {1 / LARGEST_ENTRY:g}, whose square is a number",
+                expected=f"at least {1 / LARGEST:g}, whose square is a number",
                 fix="choose other units",
             ),
             None,

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..given import LARGEST, with_a_square
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
@@ -260,9 +261,12 @@ class Model(Destroyable):
         given = np.asarray(values)
         measured, expected = f"{given.shape} of {given.dtype}", f"({self.n_dof},) finite real numbers"
         if given.shape == (self.n_dof,) and given.dtype.kind in "biuf":
-            if np.isfinite(given).all():
+            if (abs(given) <= LARGEST).all():
                 return given.astype(float, copy=False)
-            measured = f"{np.count_nonzero(~np.isfinite(given))} entries that are not finite"
+            endless = np.count_nonzero(~np.isfinite(given))
+            measured = f"{endless} entries that are not finite"
+            if not endless:
+                with_a_square("an entry of an array", float(abs(given).max()), "choose other units")
         raise InputError("an array does not fit the model", None, measured, expected, "give one real number a dof")
 
     def local_inertia(self, q: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:

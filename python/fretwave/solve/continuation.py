@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..errors import InputError
+from ..given import with_a_square
 from ..hb.harmonic_problem import HarmonicProblem
 from ..mpi.log import event
 from ..mpi.spread import Cuttable, Spread, fill
@@ -98,6 +99,7 @@ class Continuation:
             raise InputError(
                 "the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values"
             )
+        with_a_square("an end of the branch", max(1.0, *(end for end in stop if end < np.inf)), "choose other units")
         self.problem, self._y0, self._low, self._high = problem, y0, low, high
         self._core = _core.Continuation(
             problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
