@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import EXIT_DONE, InputError
 from ..mpi.alone import launched
-from ..mpi.guard import guarded, install, launched_rank
+from ..mpi.guard import guarded, install, launched_rank, open_streams
 from ..texts import display, own_version
 from ..units import SYSTEMS
 from .parser import Parser, add_folder, add_force, add_shown, names, run_folder
@@ -32,6 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code: 0 done, 2 bad input, 3 did not converge, 130 interrupted, 141 output
     that nobody reads, 1 anything else.
     """
+    open_streams()
     install()
     _leave_networks_alone()
     with _pipes_break_in_python():

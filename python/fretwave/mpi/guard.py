@@ -151,7 +151,7 @@ def _print(text: str) -> None:
         try:
             stream.write(said)
             stream.flush()
-        except BrokenPipeError:
+        except OSError:  # nobody reads it, or its disk is full: the other stream may do
             _drop(stream)
 
 
@@ -172,6 +172,17 @@ def _lone_exit(exit_: SystemExit) -> int:
     _print(f"error: rank {comm.rank} left (exit code {code}) while other ranks went on")
     comm.Abort(code or EXIT_OTHER)
     return code
+
+
+def open_streams() -> None:
+    """What a shell has closed (`>&-`) leads nowhere: else the next file to be opened took what is printed."""
+    for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free, which is this one
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
 
 
 def guarded(main: Callable[[], int]) -> int:
