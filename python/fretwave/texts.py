@@ -71,7 +71,12 @@ def nearest(word: str, known: Sequence[str], say: Callable[[str], str] = "did yo
 def display(path: Path) -> str:
     """A path as short as it can be said from here."""
     relative = os.path.relpath(path)
-    return shortened(relative if not relative.startswith("..") else str(path))
+    return readable(shortened(relative if not relative.startswith("..") else str(path)))
+
+
+def readable(name: str) -> str:
+    """The name of a file as text: bytes that are none in UTF-8, as of old archives, are written out (``\\xfc``)."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def is_there(path: Path) -> bool:

@@ -15,7 +15,7 @@ from ..model.contact import Contact
 from ..model.sectors import Sparse
 from ..model.structure import SPIN, Structure
 from ..model.wheel_matrix import Matrix
-from ..texts import toml
+from ..texts import readable, toml
 from ..units import UnitSystem
 from .analysis import Analyses, AnalysisSection
 from .analysis_tables import Damper
@@ -184,7 +184,7 @@ class Case:
     @property
     def name(self) -> str:
         """Name of the case: that of its folder, or of the file if it is not ``case.toml``."""
-        return self.path.resolve().parent.name if self.path.stem == "case" else self.path.stem
+        return readable(self.path.resolve().parent.name if self.path.stem == "case" else self.path.stem)
 
     @property
     def digest(self) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FretwaveError, InputError
-from ..texts import display
+from ..texts import display, readable
 from .streams import behind, is_stream, streamed
 
 #: Errors of a disk that takes no more.
@@ -129,7 +129,7 @@ def replace_bytes(path: Path, data: bytes, sync: bool = True) -> None:
 
 def replace_text(path: Path, text: str) -> None:
     """Write a text in one step: a reader or a kill sees the old text or the new one."""
-    replace_bytes(path, text.encode("utf-8"))
+    replace_bytes(path, readable(text).encode("utf-8"))
 
 
 def write_all(descriptor: int, data: bytes | memoryview, place: int | None = None) -> None:

@@ -160,7 +160,7 @@ class RunFolder:
 
     def _write(self, line: str) -> None:
         with told(self.path / "run.log"):
-            write_all(self._log.fileno(), f"{line}\n".encode("utf-8", "surrogateescape"))
+            write_all(self._log.fileno(), f"{line}\n".encode())
 
     def save(self) -> None:
         """Write run.json in one step."""
