@@ -38,9 +38,14 @@ def located_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_], er
     ----------
     error : stated of each amplitude
     """
-    top = int(np.argmax(amplitude))
+    ends = int(np.argmax(amplitude)) in (0, len(amplitude) - 1)
+    return NOWHERE if ends else highest_peak(omega, amplitude, event, error)
+
+
+def highest_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_], error: Array | float = np.nan) -> Peak:
+    """Largest of the located peaks, also where the response is larger at an end of the range."""
     peaks = np.flatnonzero(["peak" in text.split() for text in event])
-    if top in (0, len(amplitude) - 1) or not len(peaks):
+    if not len(peaks):
         return NOWHERE
     highest = peaks[np.argmax(amplitude[peaks])]
     return Peak(float(omega[highest]), float(amplitude[highest]), float(np.broadcast_to(error, len(omega))[highest]))

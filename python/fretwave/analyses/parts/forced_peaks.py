@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...case.analysis import AnalysisSection
 from ...post.mode_curve import ModeCurve
-from ...post.response_peaks import peak_table
+from ...post.response_peaks import highest_peak, peak_table
 from ...texts import plus_minus
 from .branch import largest_error
 from .context import AnalysisContext
@@ -39,19 +39,32 @@ def write_peaks(
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
         f"{largest_error('the amplitude', table['amplitude_error'], unit)} {table['wall_s'].sum():.2f} s"
     ]
-    for row in range(len(peaks["level"])):
-        lines.append(
-            _peak_line(context.name, {key: float(value[row]) for key, value in peaks.items()}, list(curves), unit)
-        )
+    for row, level in enumerate(peaks["level"]):
+        peak = {key: float(value[row]) for key, value in peaks.items()}
+        found = math.isfinite(peak["amplitude"])
+        said = _peak(peak, list(curves), unit) if found else _no_peak(table, level, unit)
+        lines.append(f"{context.name}: level {level:g}: {said}")
     return lines
 
 
-def _peak_line(name: str, peak: dict[str, float], curves: list[str], unit: str) -> str:
-    text = f"{name}: level {peak['level']:g}: "
-    if not math.isfinite(peak["amplitude"]):
-        return text + "no peak within the frequency range"
+def _no_peak(table: Mapping[str, Any], level: float, unit: str) -> str:
+    """Of a level that moves most at an end of the range, whose own peak is beyond: smaller peaks may lie within."""
+    omega, amplitude, event = (table[name][table["level"] == level] for name in ("omega", "amplitude", "event"))
+    within = highest_peak(omega, amplitude, event)
+    if not math.isfinite(within.amplitude):
+        return "no peak within the frequency range"
+    top = int(amplitude.argmax())
+    most, inner = f"{amplitude[top]:.4g} {unit}", f"{within.amplitude:.4g} {unit}"
+    hertz, own = omega[top] / (2 * math.pi), within.omega / (2 * math.pi)
+    return (
+        f"most at an end of the frequency range, a = {most} at {hertz:.5g} Hz: the peak is beyond"
+        f" (largest within it {inner} at {own:.5g} Hz)"
+    )
+
+
+def _peak(peak: dict[str, float], curves: list[str], unit: str) -> str:
     amplitude = f"{peak['amplitude']:.4g}{plus_minus(peak['amplitude_error'])}"
-    text += f"peak a = {amplitude} {unit} at {peak['frequency_hz']:.5g} Hz"
+    text = f"peak a = {amplitude} {unit} at {peak['frequency_hz']:.5g} Hz"
     return "".join([text, *(_distance(peak[f"distance_{curve}"], curve) for curve in curves)])
 
 
