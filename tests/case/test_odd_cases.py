@@ -22,7 +22,7 @@ import bases  # noqa: E402
 from commands import Worker  # noqa: E402
 from mutations import as_toml, mutated  # noqa: E402
 
-from fretwave.mpi.petsc_options import complaint  # noqa: E402
+from fretwave.mpi.petsc_values import complaint  # noqa: E402
 from fretwave.post.cycles import extract  # noqa: E402
 from fretwave.post.mode_curve import ModeCurve  # noqa: E402
 from fretwave.post.response_peaks import peak_table  # noqa: E402

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Optional
 from ..errors import InputError
 from ..files.memory import machine_memory, size
 from ..model.laws import law_like
-from ..mpi.petsc_options import parse
+from ..mpi.petsc_values import parse
 from ..texts import nearest, toml
 from .reporter import Reporter
 from .schema import PreloadSection

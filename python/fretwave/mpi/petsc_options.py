@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from ..errors import InputError, PetscError
 from ..texts import nearest, shortened
+from .petsc_share import AT_START, SHARED, RunWide, owner
+from .petsc_values import ENVIRONMENT, check_value, parse
 
 #: Names to suggest for a misspelt option; PETSc has many more.
 COMMON = (
     *("snes_rtol", "snes_atol", "snes_stol", "snes_max_it", "snes_monitor", "snes_converged_reason"),
     *("snes_linesearch_type", "snes_type", "ksp_type", "ksp_rtol", "ksp_max_it", "ksp_monitor"),
-    *("pc_type", "pc_factor_mat_solver_type", "mat_mumps_icntl_14", "ts_type", "ts_rtol", "ts_atol", "ts_monitor"),
+    *(
+        "route",
+        "blocks",
+        "pc_type",
+        "pc_factor_mat_solver_type",
+        "mat_mumps_icntl_14",
+        "ts_type",
+        "ts_rtol",
+        "ts_atol",
+        "ts_monitor",
+    ),
 )
 
 
@@ -27,8 +38,6 @@ NESTED = ("ascii_xml", "ascii_flamegraph")
 WHOLE = (*LOGS, "help")
 #: What options of the time integration that checks a response begin with, behind its analysis' own prefix.
 TIME = "time_"
-#: What tuned constants of the core begin with: no analysis' own (`fretwave doctor --constants`).
-TUNED = "fw_"
 
 #: What a complaint of PETSc says of the value it wants.
 WANTED = (
@@ -40,60 +49,12 @@ WANTED = (
 )
 
 
-#: Options whose value PETSc takes as it comes: what their name ends with, what is right, and in words.
-RULES: tuple[tuple[str, Callable[[float], bool], str], ...] = (
-    ("_rtol", lambda value: 0 <= value < 1, "a number from 0 to below 1"),
-    ("_atol", lambda value: 0 <= value < math.inf, "a finite number from 0 up"),
-    ("_stol", lambda value: 0 <= value < math.inf, "a finite number from 0 up"),
-    ("_max_it", lambda value: value >= 0 and value == int(value), "a whole number from 0 up"),
-    ("_max_steps", lambda value: value >= 0 and value == int(value), "a whole number from 0 up"),
-    ("ts_dt", lambda value: 0 < value < math.inf, "a finite number above 0"),
-)
+def outside() -> dict[str, str | None]:
+    """What stands in PETSc's database: from PETSC_OPTIONS, .petscrc or a script."""
+    from petsc4py import PETSc
 
-
-def complaint(name: str, value: str | None) -> str | None:
-    """What was expected of an option's value; None when it may be right."""
-    if name.endswith("_type") and value is None:
-        return "the name of a type"
-    rules = (
-        ((name, lambda value: 0 < value < math.inf, "a finite number above 0"),) if name.startswith(TUNED) else RULES
-    )
-    for ending, right, expected in rules:
-        if name.endswith(ending):
-            try:
-                return None if value is not None and right(float(value)) else expected
-            except (ValueError, OverflowError):
-                return expected
-    return None
-
-
-def parse(text: str) -> list[tuple[str, str | None]]:
-    """``-name value -flag`` as pairs; a negative number is a value."""
-    pairs: list[tuple[str, str | None]] = []
-    for word in text.split():
-        if re.match(r"-[A-Za-z_]", word):
-            pairs.append((word.lstrip("-"), None))
-        elif pairs and pairs[-1][1] is None:
-            pairs[-1] = (pairs[-1][0], word)
-        else:
-            raise InputError(
-                "these are no PETSc options",
-                "--petsc",
-                shortened(text),
-                "'-name value' pairs",
-                'for example --petsc "-snes_rtol 1e-9"',
-            )
-    for name, value in pairs:
-        expected = complaint(name, value)
-        if expected is not None:
-            raise InputError(
-                f"the PETSc option -{name} has a wrong value",
-                "--petsc, or petsc = ... of an analysis",
-                f"-{name} {shortened(value or '')}".strip(),
-                expected,
-                "correct the value, or remove the option",
-            )
-    return pairs
+    database: Any = PETSc.Options()
+    return {name: value or None for name, value in database.getAll().items()}
 
 
 class AnalysisOptions:
@@ -105,14 +66,18 @@ class AnalysisOptions:
         Put before every name that has it not yet.
     texts : sequence of str
         Option strings, the later one wins.
+    wide : RunWide
+        What is given for all analyses of a run; `texts` win.
     """
 
-    def __init__(self, prefix: str, texts: Sequence[str]) -> None:
-        self.prefix = prefix
-        self.pairs = {}
+    def __init__(self, prefix: str, texts: Sequence[str], wide: RunWide | None = None) -> None:
+        self.prefix, self.wide = prefix, wide or RunWide()
+        self.pairs = dict(self.wide.of(prefix, WHOLE))
+        #: What was in the database before and is read here too.
+        self.outside: dict[str, str | None] = {}
         for text in texts:
             for name, value in parse(text):
-                own = name if name in WHOLE or name.startswith((prefix, TUNED)) else prefix + name
+                own = name if name in WHOLE or name.startswith(prefix) or SHARED.match(name) else prefix + name
                 self.pairs[own] = value
 
     @contextmanager
@@ -123,6 +88,8 @@ class AnalysisOptions:
         from .._core import begin_log
 
         database: Any = PETSc.Options()
+        before = outside()
+        self._take_up(before)
         for name, value in self.pairs.items():
             database.setValue(name, value)
         if not set(LOGS).isdisjoint(self.pairs):
@@ -132,18 +99,34 @@ class AnalysisOptions:
         try:
             yield
         except (PetscError, PETSc.Error) as error:
-            if not self.pairs:
+            if not self.given:
                 raise
             raise self._blamed(str(error).rstrip().splitlines()[-1]) from error
         finally:
             stage.pop()
             for name in self.pairs:
-                if name not in LOGS:
+                if name in before:
+                    database.setValue(name, before[name])
+                elif name not in LOGS:
                     database.delValue(name)
+
+    @property
+    def given(self) -> dict[str, str | None]:
+        """All that the solvers of this analysis may read."""
+        return {**self.outside, **self.pairs}
+
+    def _take_up(self, before: Mapping[str, str | None]) -> None:
+        """Options of the environment that are this analysis' or shared: held to the same rules as its own."""
+        prefixes = (self.prefix, *self.wide.kinds)
+        mine = {n: v for n, v in before.items() if owner(n, prefixes) == self.prefix or SHARED.match(n)}
+        for name, value in mine.items():
+            if name not in self.pairs:
+                check_value(name, value, ENVIRONMENT)
+                self.outside[name] = value
 
     def _blamed(self, complaint: str) -> InputError:
         """PETSc failed under the user's options: the one that its complaint speaks of, or all."""
-        plain = {name.removeprefix(self.prefix): value or "" for name, value in self.pairs.items()}
+        plain = {name.removeprefix(self.prefix): value or "" for name, value in self.given.items()}
         words = re.split(r"[\s,;:'\"()]+", complaint)
         named = [name for name, value in plain.items() if name in words or (value and value in words)]
         shown = named or list(plain)
@@ -169,7 +152,11 @@ class AnalysisOptions:
         InputError
             An option is misspelt, or belongs to a solver that is not in use.
         """
-        wrong = [name for name in self._unread(unused) if not (later and name.startswith(self.prefix + later))]
+        wrong = [
+            name
+            for name in self._unread(unused)
+            if not (later and name.startswith(self.prefix + later)) and not self.wide.left_to_others(self.prefix, name)
+        ]
         if not wrong:
             return
         plain = wrong[0].removeprefix(self.prefix)
@@ -185,16 +172,46 @@ class AnalysisOptions:
         )
 
     def unread(self, unused: Callable[[], Sequence[str]]) -> str:
-        """Says at the end which options no solver has read; empty where all were."""
-        names = [f"-{name.removeprefix(self.prefix)}" for name in self._unread(unused)]
-        return f"PETSc options that no solver has read: {', '.join(names)}" if names else ""
+        """Says at the end which options no solver has read; empty where all were, or may be by other analyses."""
+        left = [name for name in self._unread(unused) if not self.wide.left_to_others(self.prefix, name)]
+        return said_unread([self._plain(name) for name in left])
+
+    def read(self, unused: Callable[[], Sequence[str]]) -> set[str]:
+        """Names, as they were given, of what solvers have read here."""
+        return {self._plain(name) for name in {*self.given} - {*self._unread(unused)}}
+
+    def _plain(self, name: str) -> str:
+        return name if SHARED.match(name) else name.removeprefix(self.prefix)
 
     def _unread(self, unused: Callable[[], Sequence[str]]) -> list[str]:
         """Names of options that nothing has read; tuned constants are read where they come in, or never."""
-        if not self.pairs:
+        if not self.given:
             return []
-        names, tuned = {re.split(r"[ =]", text.lstrip("-"))[0] for text in unused()}, _tuned()
-        return [name for name in self.pairs if name in names and name not in WHOLE and name not in tuned]
+        names, tuned = set(names_of(unused())), _tuned()
+        return [name for name in self.given if name in names and name not in WHOLE and name not in tuned]
+
+
+def said_unread(names: Sequence[str], of: str = "") -> str:
+    """Empty where there are none."""
+    return f"PETSc options{of} that no solver has read: {', '.join(f'-{name}' for name in names)}" if names else ""
+
+
+def unread_outside(unused: Sequence[str], kinds: Mapping[str, str]) -> str:
+    """Says at the end of a run which options of the environment nothing has read; empty where all were."""
+    tuned = _tuned()
+    names = [
+        name
+        for name in names_of(unused)
+        if name not in WHOLE and name not in tuned and not AT_START.match(name) and not owner(name, tuple(kinds))
+    ]
+    example = next(iter(kinds), "")
+    own = f" (an analysis' own begin with its name: -{example}{names[0]})" if names and example else ""
+    return said_unread(names, f" of {ENVIRONMENT},") + own if names else ""
+
+
+def names_of(unused: Sequence[str]) -> list[str]:
+    """Of options as PETSc lists them, with their values."""
+    return [re.split(r"[ =]", text.lstrip("-"))[0] for text in unused]
 
 
 def _tuned() -> set[str]:

@@ -15,6 +15,7 @@ from ..case.wheel import on_wheel, solver_room
 from ..console import Console
 from ..errors import FretwaveError, InputError, NotConverged
 from ..mpi.petsc_options import AnalysisOptions
+from ..mpi.petsc_share import prefix_of
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -54,7 +55,7 @@ def _look(case: Case, analysis: AnalysisSection, comm: MPI.Comm) -> tuple[list[s
     if sectors > 1 and sectors * len(case.dofs) > MOST_DOFS:
         size = f"{sectors * len(case.dofs):,} dofs, more than {MOST_DOFS:,}"
         return [f"at rest: left to the run: the wheel has {size}"], []
-    prefix = analysis.name.replace("-", "_") + "_"
+    prefix = prefix_of(analysis.name)
     case = on_wheel(case, analysis)
     with (
         model_of(case, analysis, comm) as model,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,9 @@ from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.log import event
-from ..mpi.petsc_options import TIME, AnalysisOptions
+from ..mpi.petsc_options import TIME, AnalysisOptions, said_unread, unread_outside
+from ..mpi.petsc_share import REDUCTION, RunWide, kind_of, prefix_of
+from ..mpi.petsc_values import parse
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
 from ..results.journal import Journal
@@ -91,8 +94,10 @@ class Runner:
         active = comm.rank == 0
         self.folder = RunFolder(folder, record, case.text, active, resuming, options.force)
         self.console = Console(active, self.folder.log, shown=Shown.NOTHING if part else options.shown)
-        self.part, self.time = part, Estimate()
+        self.part, self.time, self.wide = part, Estimate(), RunWide()
         self.failures: list[NotConverged] = []
+        #: PETSc options that something has read.
+        self.read: set[str] = set()
         self._basis: Callable[[], None] = _nothing
         if resuming:
             on_first_rank(comm, self._check_readable)
@@ -126,6 +131,9 @@ class Runner:
         on_first_rank(self.comm, lambda: checks.check_chosen([self.case.analyses[name] for name in names], self.case))
         sweeps = check_sweeps(self.case, names, self.options, self.comm)
         self.folder.record["selected"] = names
+        self.wide = RunWide(
+            parse(self.options.petsc), {prefix_of(name): kind_of(self.case.analyses[name]) for name in names}
+        )
         self._greet(names)
         self._reduce([name for name in names if name not in sweeps])
         try:
@@ -134,6 +142,7 @@ class Runner:
             if self.case.basis is not None:
                 self.case.basis.destroy()
         self._say_left_out(names)
+        self._say_unread()
         self._finish()
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
@@ -177,11 +186,26 @@ class Runner:
         """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
         at = None if self.case.reduction is None else self.case.reduction.error_at
         asked = at is not None and any(self.case.analyses[name].passes(at) for name in names)
-        self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=asked, only=names)
+        with self._steering_reduction():
+            self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=asked, only=names)
         if self.case.reduced is not None:
             for line in self.case.reduced.lines():
                 self.console.line(line)
             self.folder.record["reduction"] = self.case.reduced.plain()
+
+    @contextmanager
+    def _steering_reduction(self) -> Iterator[None]:
+        """Its PETSc options are in the database inside."""
+        from .. import _core
+
+        given = self.wide.reduction()
+        if self.case.reduction is None and not given:
+            yield
+            return
+        options = AnalysisOptions(REDUCTION, [], RunWide(given))
+        with options.inserted():
+            yield
+            self.read |= options.read(_core.unused_options)
 
     def _keep_basis(self, reduction: Reduction | SectorReduction) -> None:
         """For `fretwave view`: of a model with nodes, and not of the runs of a sweep. Collective."""
@@ -253,8 +277,8 @@ class Runner:
         from .. import _core
 
         began = time.perf_counter()
-        prefix = analysis.name.replace("-", "_") + "_"
-        options = AnalysisOptions(prefix, [self.options.petsc, analysis.petsc])
+        prefix = prefix_of(analysis.name)
+        options = AnalysisOptions(prefix, [analysis.petsc], self.wide)
         later = TIME if analysis.integrates() == "time_points" else ""
 
         def before_first() -> None:
@@ -284,6 +308,7 @@ class Runner:
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
             unread = options.unread(_core.unused_options)
+            self.read |= options.read(_core.unused_options)
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
         if unread and outcome.points:
@@ -328,6 +353,17 @@ class Runner:
         self.folder.record["left_out"] = told
         for line in told:
             self.console.line(line)
+
+    def _say_unread(self) -> None:
+        """Options without effect: those of the whole run that no analysis has read, those of the environment."""
+        from .. import _core
+
+        idle = [] if self.resuming else [name for name in self.wide.of_all() if name not in self.read]
+        if idle:
+            self.console.line(f"note: {said_unread(idle)}")
+        unread = unread_outside(_core.unused_options(), self.wide.kinds)
+        if unread:
+            self.console.line(f"note: {unread}")
 
     def _finish(self) -> None:
         self.folder.record["status"] = "stopped" if self.failures else "done"

@@ -21,6 +21,7 @@ from ...errors import InputError
 from ...files.csv_table import write_columns
 from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
+from ...mpi.petsc_share import prefix_of
 from ...post.mode_curve import ModeCurve
 from ...results.analysis import own_curve
 from ...results.reader import write_curve
@@ -144,7 +145,7 @@ class AnalysisContext(Generic[Section]):
     @property
     def prefix(self) -> str:
         """Prefix of the PETSc options."""
-        return self.analysis.name.replace("-", "_") + "_"
+        return prefix_of(self.analysis.name)
 
     def of(self, analysis: Other, **changes: Any) -> AnalysisContext[Other]:
         """The same for another analysis, with other changes."""

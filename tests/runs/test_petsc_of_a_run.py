@@ -1,0 +1,121 @@
+"""PETSc options of a whole run: each goes to the analyses whose solvers read it, and is told where nothing does."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from command_line import call
+from models.core_models import options
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "cases" / "robustness"))
+import bases  # noqa: E402
+from mutations import as_toml  # noqa: E402
+
+from fretwave.errors import InputError  # noqa: E402
+from fretwave.mpi.petsc_options import AnalysisOptions  # noqa: E402
+from fretwave.mpi.petsc_share import RunWide  # noqa: E402
+from fretwave.mpi.petsc_values import parse  # noqa: E402
+
+pytestmark = pytest.mark.ranks(1)
+
+UNREAD = "that no solver has read"
+
+
+@pytest.fixture
+def run(tmp_path: Path, capfd):
+    """Runs analyses of the oscillator with options, and tells its exit code and what it said."""
+    (tmp_path / "case.toml").write_text(as_toml(bases.two_dof()), encoding="utf-8")
+
+    def runs(only: str, petsc: str = "", *more: str) -> tuple[int, str]:
+        out = ["--out", tmp_path / "out", "--no-plots", "--force"]
+        code = call("run", tmp_path / "case.toml", "--only", only, f"--petsc={petsc}", *out, *more)
+        return code, "".join(capfd.readouterr())
+
+    return runs
+
+
+@pytest.mark.parametrize(
+    "petsc",
+    [
+        "-route direct",  # of harmonic balance alone
+        "-ts_max_steps 100000",  # of steps in time alone
+        "-modes_eps_ncv 30",  # what the core advises where modes do not converge
+        "-mode_snes_max_it 24 -free_decay_ts_max_steps 100000",  # each of one analysis
+        "-mode_epmc_snes_max_it 24",  # of an analysis whose name begins with that of another
+    ],
+)
+def test_it_need_be_read_by_one_analysis_alone(run, petsc: str) -> None:
+    code, said = run("mode,mode_epmc,free_decay", petsc)
+    assert code == 0 and UNREAD not in said
+
+
+def test_of_one_analysis_it_steers_that_alone(run) -> None:
+    said = run("mode,mode_epmc", "-mode_epmc_snes_monitor")[1]
+    first, second = said.split("mode_epmc: 2 of 2 analyses")
+    assert "SNES Function norm" in second and "SNES Function norm" not in first
+
+
+@pytest.mark.parametrize(
+    "petsc", ["-snes_rtoll 1e-9", "-routee direct", "-fw_linear_renewl 1", "-free_decay_nonsense 1"]
+)
+def test_a_misspelt_one_is_refused_before_the_first_point(run, petsc: str, tmp_path: Path) -> None:
+    code, said = run("mode", petsc)
+    assert code == 2 and petsc.split()[0] in said and not (tmp_path / "out").exists()
+
+
+def test_what_nothing_has_read_is_told_at_the_end(run) -> None:
+    code, said = run("mode,mode_epmc", "-static_snes_monitor -component_eps_tol 1e-9")
+    assert code == 0 and said.count(UNREAD) == 1
+    assert f"{UNREAD}: -static_snes_monitor, -component_eps_tol" in said
+
+
+@pytest.mark.parametrize("petsc", ["-malloc_debug", "-info :file", "-fp_trap", "-options_left", "-on_error_abort"])
+def test_what_petsc_reads_as_it_starts_belongs_into_the_environment(run, petsc: str) -> None:
+    code, said = run("mode", petsc)
+    assert code == 2 and f"PETSC_OPTIONS='{petsc}'" in said
+
+
+@pytest.mark.parametrize(
+    "name, value, expected",
+    [
+        ("mode_snes_rtol", "abc", "0 to below 1"),
+        ("mode_ksp_type", "nonsense", "a name that PETSc knows"),
+        ("mode_snes_rtoll", "1", "did you mean `-snes_rtol`?"),
+        ("fw_linear_renewal", "-3", "above 0"),
+        ("fw_linear_renewl", "3", "did you mean `-fw_linear_renewal`?"),
+    ],
+)
+def test_those_of_the_environment_are_held_to_the_same_rules(run, name: str, value: str, expected: str) -> None:
+    with options(**{name: value}):
+        code, said = run("mode")
+    assert code == 2 and expected in said and "PETSc error" not in said
+
+
+def test_one_of_the_environment_without_effect_is_told(run) -> None:
+    with options(snes_rtol=1e-3):
+        code, said = run("mode")
+    assert code == 0 and f"{UNREAD}: -snes_rtol (an analysis' own begin with its name: -mode_snes_rtol)" in said
+
+
+def test_one_of_the_environment_stands_again_behind_an_analysis() -> None:
+    from petsc4py import PETSc
+
+    with options(fw_linear_renewal=0.25):
+        with AnalysisOptions("mode_", ["-fw_linear_renewal 0.5"]).inserted():
+            assert PETSc.Options().getReal("fw_linear_renewal") == 0.5
+        assert PETSc.Options().getReal("fw_linear_renewal") == 0.25
+
+
+def test_the_more_special_one_wins_and_of_two_the_last() -> None:
+    wide = RunWide(parse("-mode_snes_rtol 1e-9 -snes_rtol 1e-6 -snes_rtol 1e-7"), {"mode_": "", "epmc_": ""})
+    assert AnalysisOptions("mode_", [], wide).pairs == {"mode_snes_rtol": "1e-9"}
+    assert AnalysisOptions("epmc_", [], wide).pairs == {"epmc_snes_rtol": "1e-7"}
+    assert AnalysisOptions("epmc_", ["-snes_rtol 1e-5"], wide).pairs == {"epmc_snes_rtol": "1e-5"}
+
+
+def test_one_analysis_own_ones_are_no_other_one_s() -> None:
+    with pytest.raises(InputError, match="epmc_snes_rtol"):
+        AnalysisOptions("mode_", ["-epmc_snes_rtol 1e-5"]).check_used(lambda: ["-mode_epmc_snes_rtol 1e-5"], "here")
