@@ -4,17 +4,16 @@
 /// Parts of the work by name in PETSc's -log_view.
 namespace fretwave::log {
 
-/// Registered once; the name has at most 16 letters.
+/// Makes all events known, once: PETSc's nested formats tell them by their numbers, which have to be the same
+/// on all ranks, whatever one rank does alone.
+void register_events();
+/// The number of a registered one.
+PetscLogEvent event_named(char const* name);
+
+/// One of those that are registered, of at most 16 letters.
 class Event {
  public:
-  explicit Event(char const* name) {
-    static const PetscClassId id = [] {
-      PetscClassId made;
-      check(PetscClassIdRegister("fretwave", &made));
-      return made;
-    }();
-    check(PetscLogEventRegister(name, id, &event_));
-  }
+  explicit Event(char const* name) : event_(event_named(name)) {}
   operator PetscLogEvent() const { return event_; }
 
  private:

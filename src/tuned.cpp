@@ -1,5 +1,7 @@
 #include "tuned.h"
 
+#include <algorithm>
+
 #include "petsc.h"
 #include "text.h"
 
@@ -14,19 +16,23 @@ std::vector<Tuned const*>& registered() {
 
 }  // namespace
 
-Tuned::Tuned(char const* name, double value, char const* meaning)
-    : name_(name), meaning_(meaning), value_(value) {
+Tuned::Tuned(char const* name, double value, char const* meaning, double below)
+    : name_(name), meaning_(meaning), value_(value), below_(below) {
   registered().push_back(this);
 }
 
 Tuned::operator double() const {
   double value = value_;
   check(PetscOptionsGetReal(nullptr, nullptr, ("-fw_" + name()).c_str(), &value, nullptr));
-  if (!(value > 0 && std::isfinite(value)))
-    throw InputError("option fw_" + name() + ": " + meaning_, short_text(value), "a number above zero",
-                     "leave it out");
+  if (!(value > 0 && value < below_))
+    throw InputError(
+        "option fw_" + name() + ": " + meaning_, short_text(value),
+        std::isinf(below_) ? "a number above zero" : "a number from zero to " + short_text(below_),
+        "leave it out");
   return value;
 }
+
+int Tuned::count() const { return int(std::min(double(*this), 1e8)); }
 
 namespace {
 

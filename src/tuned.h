@@ -1,6 +1,7 @@
 #pragma once
 #include <mpi.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -10,10 +11,12 @@ namespace fretwave {
 /// where it is used. PETSc's -help, `fretwave doctor --constants` and `all` list them.
 class Tuned {
  public:
-  Tuned(char const* name, double value, char const* meaning);
+  /// It is below a number too, where that is given: a share or a relative residual.
+  Tuned(char const* name, double value, char const* meaning, double below = INFINITY);
   Tuned(Tuned const&) = delete;
-  /// `InputError` where the option is no number above zero.
+  /// `InputError` where the option is no number between zero and that bound.
   operator double() const;
+  int count() const;  ///< the whole number in it, of a few hundred million at the most
   std::string name() const { return name_; }
   double value() const { return value_; }  ///< without the option
   std::string meaning() const { return meaning_; }
@@ -23,7 +26,7 @@ class Tuned {
 
  private:
   char const *name_, *meaning_;
-  double value_;
+  double value_, below_;
 };
 
 }  // namespace fretwave

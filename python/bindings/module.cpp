@@ -12,6 +12,7 @@
 #include "error.h"
 #include "fault.h"
 #include "flat_product.h"
+#include "log.h"
 #include "precondition/kinds.h"
 #include "tuned.h"
 #include "wheel/wheel_pc.h"
@@ -101,6 +102,7 @@ NB_MODULE(_core, m) {
   give_memory_back();
   mend_blas_kernels();
   check(SlepcInitializeNoArguments());
+  log::register_events();
   wheel::register_kinds();
   precondition::register_kinds();
   fault::arm_from(std::getenv("FRETWAVE_FAULT"), comm_rank(PETSC_COMM_WORLD));

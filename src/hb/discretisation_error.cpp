@@ -19,7 +19,7 @@ namespace fretwave::hb {
 namespace {
 
 const Tuned tolerance("error_tolerance", 1e-3,
-                      "relative residual of the linear systems: errors move by 1 % at most");
+                      "relative residual of the linear systems: errors move by 1 % at most", 1);
 const Tuned memory_share("error_memory_share", 0.5, "share of the free memory that estimates may take");
 constexpr double vectors = 70;  // of a problem: its own, and for each GMRES iteration two
 const Tuned negligible("error_negligible", 1e-6,
@@ -262,7 +262,7 @@ void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<
   VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
   again_->scale(y);  // before it is said how far to go
   check(SNESSetTolerances(again_->snes(), solved * to_moved() * residual, PETSC_DEFAULT, PETSC_DEFAULT,
-                          PetscInt(most_steps), PETSC_DEFAULT));
+                          most_steps.count(), PETSC_DEFAULT));
   again_->system().close(row, solve::dot(row, point));
   const bool found = again_->solve(y, solve::Effort::brief).converged;
   check(VecAXPY(y, -1, point));

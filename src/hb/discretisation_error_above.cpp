@@ -51,7 +51,8 @@ double DiscretisationError::bound(int order) const {
 /// kink: a = 2), by (H / H')^(2 a - 1) where it follows the velocity (a jump: a = 1).
 double DiscretisationError::all_above(Vec force) const {
   const auto twice_a = fall(force);
-  const double least = slowest, most = fastest, unknown = of_velocity_ ? (least + most) / 2 : most,
+  const double least = slowest, most = std::max(least, double(fastest)),
+               unknown = of_velocity_ ? (least + most) / 2 : most,
                told = twice_a ? *twice_a - (of_velocity_ ? 1 : 0) : unknown,
                share = bound(problem_.harmonics().highest()) / bound(finer_->harmonics().highest());
   return 1 / (1 - std::pow(share, std::clamp(told, least, most)));

@@ -152,7 +152,7 @@ std::unique_ptr<StuckBasis> StuckBasis::with_factor(Model const& model) {
   if (!model::symmetric(K)) return nullptr;
   auto factor = std::make_unique<StaticFactor>(K);
   if (!factor->definite()) return nullptr;
-  const PetscInt count = std::min(PetscInt(double(lowest)), std::max(PetscInt(1), model.dofs() / 3));
+  const PetscInt count = std::min(PetscInt(lowest.count()), std::max(PetscInt(1), model.dofs() / 3));
   out->theta_ = lowest_modes(*factor, M, count, out->exactly_);
   if (out->theta_.empty()) return nullptr;
   out->modes_ = int(out->theta_.size()), out->local_ = int(model.local_dofs()), out->dofs_ = model.dofs();

@@ -132,7 +132,8 @@ void BasisPreconditioner::couple(std::vector<PairTangents> const& contacts) {
   for (auto const& correction : corrections_)
     if (!correction.idle()) own.push_back(&correction);
   coupled_ = std::make_unique<CoupledPairs>(
-      problem_.comm(), std::move(own), [this](double const* f, double* u) { add_coupling(f, u); }, most);
+      problem_.comm(), std::move(own), [this](double const* f, double* u) { add_coupling(f, u); },
+      most.count());
 }
 
 /// Corrections of this rank's pairs that are not stuck; which of all its pairs couple harmonics.

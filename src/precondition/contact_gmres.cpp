@@ -47,7 +47,7 @@ std::vector<double> ContactGmres::solve(std::vector<double> b) {
     size = norm(left);
   }
   auto x = combined(std::move(given));
-  forget(size_t(kept));
+  forget(size_t(kept.count()));
   return x;
 }
 

@@ -12,7 +12,7 @@ namespace fretwave::precondition {
 namespace {
 
 // Near a soft motion the blocks enlarge what is left: 3e-2 took twice as many iterations outside.
-const Tuned tolerance("pairs_tolerance", 1e-3, "relative residual of the pairs' coupling");
+const Tuned tolerance("pairs_tolerance", 1e-3, "relative residual of the pairs' coupling", 1);
 
 }  // namespace
 

@@ -73,11 +73,11 @@ ModalBlocks::ModalBlocks(model::StuckBasis const& basis, Harmonics const& h, int
 void ModalBlocks::set_structure(std::vector<std::vector<complex>> z, double at_rest, ModalBorder border) {
   z_ = std::move(z), at_rest_ = at_rest, border_ = std::move(border);
   const double nearly_static = follows, far_from_resonance = resonant;
-  low_ = std::min(int(fewest), modes_);
+  low_ = std::min(fewest.count(), modes_);
   for (auto const& of_modes : z_)
     for (int j = low_; j < modes_; ++j)
       if (std::abs(of_modes[j] / at_rest - 1.0) > nearly_static) low_ = j + 1;
-  low_ = std::min(low_, int(most));
+  low_ = std::min(low_, most.count());
   flexible_ = z_;
   for (auto& of_modes : flexible_)
     for (int j = low_; j < modes_; ++j)

@@ -141,7 +141,7 @@ void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
   const auto between = [this](double const* f, double* u) {
     for (auto const& G : between_) G->apply(f, u);
   };
-  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), between, most);
+  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), between, most.count());
 }
 
 void PairwisePreconditioner::build(Vec y, Vec row) {

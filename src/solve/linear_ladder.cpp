@@ -76,7 +76,7 @@ bool LinearSolver::fits(double bytes, std::string const& what) {
 void LinearSolver::descend() {
   if (!rung_ || ++solved_ < stay_) return;
   rung_ = 0, solved_ = 0, stale_ = true;
-  stay_ = std::min(int(longest_stay), 2 * stay_);
+  stay_ = std::min(longest_stay.count(), 2 * stay_);
   fallback_.reset();
 }
 

@@ -11,7 +11,7 @@ namespace fretwave::solve {
 
 namespace {
 
-const Tuned roughly("linear_roughly", 1e-2, "relative residual of Newton steps far from a solution");
+const Tuned roughly("linear_roughly", 1e-2, "relative residual of Newton steps far from a solution", 1);
 const Tuned straight("linear_straight", 0.03,
                      "share of the residual that a step leaves, up to which the preconditioner stays");
 const Tuned farther("linear_farther", 3, "how far it stays, over the length of that step, at the most");

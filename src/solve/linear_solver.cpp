@@ -20,9 +20,9 @@ const Tuned large("linear_large", 3e4,
                   "unknowns above which steps far from a solution, and tangents, are solved to fewer digits");
 // Predictors through near points enlarge it: with 1e-4 of 768 pairs a branch of 11 points took 28.
 const Tuned rough_tangent("linear_rough_tangent", 1e-7,
-                          "relative residual of tangents of large problems that steps are taken along");
+                          "relative residual of tangents of large problems that steps are taken along", 1);
 const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
-                             "residual of a tangent, relative, where rounding lets GMRES go no further");
+                             "residual of a tangent, relative, where rounding lets GMRES go no further", 1);
 
 /// Our options under the prefix, where PETSc's -help is given; its macros return its error codes.
 PetscErrorCode offered(MPI_Comm comm, std::string const& prefix) {

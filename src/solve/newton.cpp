@@ -27,7 +27,7 @@ const Tuned small_effect("newton_small_effect", 1e-8,
                          "relative change of frequency and damping that a step may leave");
 const Tuned largest_effect("newton_largest_effect", 1e-6,
                            "the change it may leave where rounding lets the residual fall no further");
-const Tuned roughest("newton_roughest", 1e-4, "residual to which a tangent is solved at the least");
+const Tuned roughest("newton_roughest", 1e-4, "residual to which a tangent is solved at the least", 1);
 const Tuned far("newton_far", 1e5, "step over residual from which the Jacobian is nearly singular");
 const Tuned patience("newton_patience", 10,
                      "iterations after which a residual below the tolerance is enough");

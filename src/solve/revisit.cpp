@@ -54,7 +54,7 @@ bool Continuation::fell_back(Trial const& trial) {
 /// fall onto a sheet beside it. False where it is lost: none is to lead far aside of its tangent.
 bool Continuation::walk(Trial& there, Vec row, double to) {
   double longest = INFINITY;
-  for (int left = walked; left > 0; --left) {
+  for (int left = walked.count(); left > 0; --left) {
     const double from = dot(row, there.y), next = left > 1 ? from + (to - from) / left : to,
                  step = (next - from) / dot(row, there.tangent);
     if (!(std::abs(step) <= longest)) return false;

@@ -140,7 +140,7 @@ std::shared_ptr<WaveBasis> WaveBases::all_of(int d) const {
 
 std::shared_ptr<WaveBasis> WaveBases::lowest_of(int d) const {
   if (!kept_->factor->take(d)) return nullptr;
-  auto found = lowest_waves(*kept_->factor, of_order_[0], of_order_[2], d, int(lowest));
+  auto found = lowest_waves(*kept_->factor, of_order_[0], of_order_[2], d, lowest.count());
   auto basis = std::make_shared<WaveBasis>();
   const int m = int(found.theta.size()), n = mean_.dofs(), R = contact_.rows();
   basis->factor = kept_->factor;

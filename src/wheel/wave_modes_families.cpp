@@ -16,7 +16,7 @@ const Tuned near("wheel_near", 0.3, "dynamic over static stiffness of a mode up 
 const Tuned most("wheel_most", 250, "modes in families, at the most");
 const Tuned far("wheel_families_far", 1e-2,
                 "relative change of the exponents at which families are chosen anew");
-const Tuned tolerance("wheel_tolerance", 0.1, "relative residual of the sectors' coupling");
+const Tuned tolerance("wheel_tolerance", 0.1, "relative residual of the sectors' coupling", 1);
 const Tuned most_inside("wheel_inside", 30, "iterations of the sectors' coupling, at the most");
 
 }  // namespace
@@ -45,7 +45,7 @@ void WaveModes::find_family(Exponents const& e) {
   }
   auto all = gathered(std::span<double const>(sizes), problem_.comm());
   std::ranges::sort(all);
-  const double limit = all.size() > size_t(most) ? all[size_t(most)] : INFINITY;
+  const double limit = all.size() > size_t(most.count()) ? all[most.count()] : INFINITY;
   std::vector<Families::Member> members;
   std::vector<complex> shapes;
   for (auto const& [w, l, size] : found) {
@@ -176,7 +176,7 @@ std::vector<complex> WaveModes::coupled(std::vector<complex> u, std::vector<comp
         std::ranges::transform(to_parts(between(reply(from_parts(in), {}, E).f)), in, out.begin(),
                                std::plus());
       },
-      tolerance, int(most_inside));
+      tolerance, most_inside.count());
   const auto of_none = between(reply(std::vector<complex>(u.size()), r, E).f);
   for (size_t k = 0; k < u.size(); ++k) u[k] -= of_none[k];
   return from_parts(gmres.solve(to_parts(u)));

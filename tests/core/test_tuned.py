@@ -55,3 +55,34 @@ def test_doctor_lists_them():
     lines = "\n".join(said).splitlines()
     assert len(lines) == len(_core.tuned_constants())
     assert any(line.split()[:2] == ["-fw_linear_krylov_limit", "300"] for line in lines)
+
+
+@pytest.mark.ranks(1)
+def test_none_is_cast_to_an_integer():
+    """1e300 is none; `count` bounds it."""
+    for file in (Path(__file__).parents[2] / "src").rglob("*.cpp"):
+        text = file.read_text()
+        for name in re.findall(r"Tuned (\w+)\(", text):
+            found = re.search(rf"\b(int|size_t|PetscInt)(\(| \w+ = )(double\()?{name}\b(?!\.)", text)
+            assert not found, f"{file.name}: {found and found[0]}"
+
+
+def slider(comm) -> fw.NonlinearMode:
+    law = {"tangential_stiffness": 1.0, "friction_limit": 1.0}
+    model = fw.Model(np.eye(1), np.eye(1), None, [fw.Contact("jenkins", np.eye(1), law)], comm=comm)
+    return fw.NonlinearMode(model, fw.Harmonics([1, 3], 64), "CNM", 0)
+
+
+@pytest.mark.ranks(1)
+def test_a_share_of_one_and_more_is_refused(comm):
+    with options(fw_error_tolerance=2), pytest.raises(fw.InputError, match="a number from zero to 1"):
+        fw.follow(slider(comm), 2.0, 2.5)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("given", [{"fw_error_slowest": 10, "fw_error_fastest": 2}, {"fw_error_steps": 1e300}])
+def test_numbers_that_cross_or_are_huge_stop_nothing(comm, given):
+    """Bounds that cross aborted the process where the library asserts their order."""
+    with options(**given):
+        branch = fw.follow(slider(comm), 2.0, 2.5)
+    assert branch.converged and np.isfinite(branch["zeta_error"]).all()

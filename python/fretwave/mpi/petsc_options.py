@@ -9,7 +9,6 @@ from typing import Any
 
 from ..errors import InputError, PetscError
 from ..texts import nearest, shortened
-from .log import register_events
 from .petsc_share import AT_START, SHARED, RunWide, owner
 from .petsc_values import ENVIRONMENT, check_value, parse
 
@@ -94,7 +93,6 @@ class AnalysisOptions:
         for name, value in self.pairs.items():
             database.setValue(name, value)
         if not set(LOGS).isdisjoint(self.pairs):
-            register_events()
             begin_log(not set((self.pairs.get("log_view") or "").split(":")).isdisjoint(NESTED))
         stage = PETSc.Log.Stage(self.prefix.rstrip("_"))
         stage.push()
