@@ -11,13 +11,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from command_line import call
 
 from fretwave.errors import InputError
+from fretwave.files.place import expect_writable
 from fretwave.files.streams import is_stream
 from fretwave.files.whole import replace_text, replaced
 from fretwave.view.vtkhdf import GridFile
 
 pytestmark = pytest.mark.ranks(1)
+
+CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
 
 
 def through_a_pipe(pipe: Path, write: Callable[[Path], object]) -> str:
@@ -79,3 +83,23 @@ def test_a_file_written_in_any_order_is_no_pipe(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="a device or a pipe"):
         GridFile(pipe, [0.0])
     assert stat.S_ISFIFO(pipe.stat().st_mode) and list(tmp_path.iterdir()) == [pipe]
+
+
+@pytest.mark.parametrize("place", ["/proc/1/run", "/proc/run/deep"])
+def test_a_place_without_files_is_refused_before_anything_is_solved(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The folder is made with the first point, which may come hours later."""
+
+    def solved(*_: object, **__: object) -> None:
+        raise AssertionError("a model is built")
+
+    monkeypatch.setattr("fretwave.case.build.build_model", solved)
+    assert call("run", CASE, "--out", place) == 1
+    said = capfd.readouterr().err
+    assert "a file cannot be written or read" in said and "/proc" in said and "check that the folder" in said
+
+
+def test_nothing_is_left_where_it_was_tried(tmp_path: Path) -> None:
+    expect_writable(tmp_path / "runs" / "deep")
+    assert list(tmp_path.iterdir()) == []

@@ -4,11 +4,26 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from ..errors import InputError
 from ..texts import display, is_there
+from .whole import told
 
 LONGEST = 255  #: bytes of a name, in the file systems of Linux
+
+
+def expect_writable(folder: Path) -> None:
+    """Nothing is left there, or in the folder that it will be made in.
+
+    Raises
+    ------
+    FileError
+        Files cannot be made there.
+    """
+    there = next(parent for parent in (folder, *folder.absolute().parents) if is_there(parent))
+    with told(there), TemporaryFile(dir=there):
+        pass
 
 
 def expect_place(path: Path, fix: str) -> None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files.lock import FolderLock, check_free
-from ..files.place import expect_place
+from ..files.place import expect_place, expect_writable
 from ..files.whole import replace_text, told, write_all
 from ..mpi.guard import on_first_rank
 from ..texts import display, own_version
@@ -35,6 +35,8 @@ def results_folder(given: Path | None, name: str, comm: MPI.Comm) -> Path:
     ------
     InputError
         It is a file, lies in one, or has a name that none can have.
+    FileError
+        It cannot be written.
     """
     folder = given or Path("runs") / name
     on_first_rank(comm, lambda: _expect_folder(folder))
@@ -43,6 +45,7 @@ def results_folder(given: Path | None, name: str, comm: MPI.Comm) -> Path:
 
 def _expect_folder(folder: Path) -> None:
     expect_place(folder / RECORD, "name a folder")
+    expect_writable(folder)
 
 
 class RunFolder:
