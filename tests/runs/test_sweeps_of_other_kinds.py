@@ -13,6 +13,8 @@ from models.swept_case import CASE, MEMORYLESS
 from models.wear_case import write_case
 from tolerances import REPEATED, SOLVED
 
+from fretwave.results.file import rewritten
+
 pytestmark = pytest.mark.ranks(1)
 
 SECTORS = 6
@@ -62,6 +64,11 @@ def test_linear_frequencies_in_closed_form(tmp_path: Path, capsys) -> None:
     assert column(run / "summary.csv", "hz_stuck_1") == pytest.approx(np.sqrt(1 + stiffness) / (2 * np.pi), rel=SOLVED)
     assert column(run / "summary.csv", "hz_free_1") == pytest.approx(1 / (2 * np.pi), rel=SOLVED)
     assert "linear: tangential_stiffness = 3.0: 2 modes, 0.159155 to 0.31831 Hz" in capsys.readouterr().out
+    with rewritten(run / "results.h5", "none") as file:  # as an earlier version wrote it
+        for name in ("hz_stuck_1", "hz_free_1"):
+            del file[f"linear/summary/{name}"]
+    assert call("show", run) == 0
+    assert "linear: tangential_stiffness = 3.0: 2 points" in capsys.readouterr().out
 
 
 def test_wear_by_amplitude(tmp_path: Path, capsys) -> None:

@@ -155,6 +155,8 @@ def _text(value: Any) -> str:
 
 def _linear_words(row: Row) -> str:
     hz, factors = ([row[key] for key in row if key.startswith(column.name)] for column in reversed(LINEAR))
+    if not hz:
+        raise KeyError(LINEAR[1].name)
     known = [value for value in factors if math.isfinite(value)]
     words = f"{len(hz)} modes, {min(hz):.6g} to {max(hz):.6g} Hz"
     return words + (f"; largest amplification {max(known):.4f}" if known else "")

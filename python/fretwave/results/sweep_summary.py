@@ -263,7 +263,15 @@ def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary, unit: str
     """A line for each row of a sweep's summary, for the terminal; `unit` of the amplitudes."""
     labels = plan.labels()
     told = [{**row, "unit": unit} for row in rows]
-    return [f"{name}: {labels[row['value']]}{_part(row, of)}: {of.words(row)}" for row in told]
+    return [f"{name}: {labels[row['value']]}{_part(row, of)}: {_said(row, of)}" for row in told]
+
+
+def _said(row: Row, of: Summary) -> str:
+    """In words; older results may lack what they say."""
+    try:
+        return of.words(row)
+    except KeyError:
+        return COUNTS.words(row)
 
 
 def read_landmarks(name: str, group: h5py.Group) -> list[str]:
