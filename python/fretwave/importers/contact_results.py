@@ -3,12 +3,12 @@
 ``*CONTACT FILE`` with CDIS, CSTR writes the block CONTACT of a .frd file: at the nodes of the dependent (slave) side
 COPEN [length] (> 0 open), CSLIP1, CSLIP2 [length], CPRESS, CSHEAR1, CSHEAR2 [pressure]. A pair's forces are its area
 times those. Of contact from node to surface they are the nodes' own; nodes that are far open may be left out: the block
-DISP tells their gaps. Of that from surface to surface they are extrapolated from inside of the faces, and to nodes that
-DISP shows apart as well, which are open; ``*CONTACT PRINT, SLAVE=.., MASTER=..`` with CF then writes the exact force of
-the whole contact into the .dat file beside, to which the pairs' forces are scaled. Which it is the step's deck tells
-when it stands beside; without it a node that is listed as open, which only contact from node to surface does. A .dat
-file alone will do where ``*CONTACT PRINT`` with CDIS, CSTR wrote the slave nodes into it (node to surface). The last
-step of a file counts.
+DISP tells their gaps, with the distance in the mesh (`stand_off`). Of that from surface to surface they are
+extrapolated from inside of the faces, and to nodes that DISP shows apart as well, which are open; ``*CONTACT PRINT,
+SLAVE=.., MASTER=..`` with CF then writes the exact force of the whole contact into the .dat file beside, to which the
+pairs' forces are scaled. Which it is the step's deck tells when it stands beside; without it a node that is listed as
+open, which only contact from node to surface does. A .dat file alone will do where ``*CONTACT PRINT`` with CDIS, CSTR
+wrote the slave nodes into it (node to surface). The last step of a file counts.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from ..model.sectors import by_sector
 from ..texts import counted, display, shortened
 from .calculix import beside
 from .keywords import blocks
+from .stand_off import Sides, StandOff, of_sides, read_stand_off
 
 #: Components of the two blocks, 12 characters each behind the node's number.
 BLOCKS, WIDTH = {"CONTACT": 6, "DISP": 3}, 12
@@ -70,6 +71,7 @@ class StaticStep:
     forces : compressive normal force [force] of a contact by its dependent and independent surface, capital letters
     where : the file
     at_nodes : the contact is the nodes' own (node to surface), not extrapolated to them
+    stand_off : what the deck says of the distance with which the step begins
     """
 
     contact: Nodal
@@ -77,13 +79,24 @@ class StaticStep:
     forces: Mapping[tuple[str, str], float]
     where: str
     at_nodes: bool
+    stand_off: Mapping[Sides, StandOff]
 
     def force(self, sides: Sequence[str], alone: bool) -> float | None:
         """Of the contact between two sides, or where there is but one in model and file (`alone`) of that."""
-        names = tuple(side.partition("@")[0].upper() for side in sides)
+        names = surfaces(sides)
         found = next((force for known, force in self.forces.items() if set(known) == set(names)), None)
         only = next(iter(self.forces.values())) if alone and len(self.forces) == 1 else None
         return only if found is None else found
+
+    def begins_at(self, pairs: Pairs, sides: Sequence[str]) -> Array:
+        """How far the sides of each pair are apart as the step begins (n_pairs,) [length], below zero they overlap."""
+        mesh = np.zeros(pairs.n_pairs) if pairs.clearance is None else np.asarray(pairs.clearance)
+        return of_sides(self.stand_off, surfaces(sides)).of(mesh)
+
+
+def surfaces(sides: Sequence[str]) -> tuple[str, ...]:
+    """Names of the sides of a contact as a deck has them."""
+    return tuple(side.partition("@")[0].upper() for side in sides)
 
 
 def read_step(path: Path) -> StaticStep:
@@ -103,7 +116,8 @@ def read_step(path: Path) -> StaticStep:
         raise InputError("there is no contact in the results", display(path), "none", expected, fix)
     forces = {(one[1].upper(), one[2].upper()): -float(one[4]) for one in _STATISTICS.finditer(text)}
     at_nodes = path == printed or (not forces and _at_nodes(path, found["CONTACT"].values))
-    return StaticStep(found["CONTACT"], found.get("DISP"), forces, display(path), at_nodes)
+    stand_off = read_stand_off(beside(path, ".inp"))
+    return StaticStep(found["CONTACT"], found.get("DISP"), forces, display(path), at_nodes, stand_off)
 
 
 def _at_nodes(path: Path, contact: Array) -> bool:
@@ -235,7 +249,7 @@ def at_rest(
         measured = f"results at the nodes of {known} of {counted(len(areas), 'pair')}, none with a pressure"
         fix = "check the sets of --pairs, and that the step presses them together"
         raise InputError("no pair of the contact is pressed", where, measured, "a pressure above 0 at some node", fix)
-    apart, printed, opened = _apart(pairs, step, labels), step.force(sides, alone), ""
+    apart, printed, opened = step.begins_at(pairs, sides) + _apart(pairs, step, labels), step.force(sides, alone), ""
     if not step.at_nodes:
         open_ = pressed & (apart > 0)  # a pressure there is extrapolated from beside
         opened = _opened(open_, np.where(pressed, areas * values[:, PRESSURE], 0.0), printed, where)

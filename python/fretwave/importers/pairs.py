@@ -113,11 +113,13 @@ def match(
         b = _placed(a, side_of(nodes, second), turn, ahead, reach, where)
         normals = normals_of(a, normal)
         found = _pair(a, b, normals, where, nodes, reach)
-    if notes is not None and found.note:
-        notes.append(f"contact '{name}': {found.note}")
     areas = a.areas if found.areas is None else found.areas
     normals = normals if found.kept is None else normals[found.kept]
-    return joined(name, found, normals, areas, where, labels, nodes, tangent, ahead)
+    pairs = joined(name, found, normals, areas, where, labels, nodes, tangent, ahead)
+    note = found.note + _said(pairs.clearance)
+    if notes is not None and note:
+        notes.append(f"contact '{name}': {note}")
+    return pairs
 
 
 def _without_next(second: str, turn: Array | None, where: str) -> tuple[str, Array | None]:
@@ -182,12 +184,9 @@ def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: flo
         check_facing(normals, b, partner)
         usual = reach_of(nodes, None)
         note = f"its nodes are up to {distance.max():.2g} apart" if distance.max() > usual else ""
-        return Found(both, b.numbers, weights, note + _clearance(normals, weights @ b.points - a.points, usual))
+        return Found(both, b.numbers, weights, note)
     if b.faces:
-        found = _projected(a, b, both, (normals, partner), where, reach)
-        mine = slice(None) if found.kept is None else found.kept
-        way = found.weights @ b.points - a.points[mine]
-        return replace(found, note=found.note + _clearance(normals[mine], way, reach_of(nodes, None)))
+        return _projected(a, b, both, (normals, partner), where, reach)
     distance_b = cKDTree(a.points).query(b.points[left])[0] if len(left) else []
     alone += [f"{n} ({d:.3g} away)" for n, d in zip(b.numbers[left], distance_b)]
     raise InputError(
@@ -201,12 +200,23 @@ def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: flo
     )
 
 
-def _clearance(normals: Array, way: Array, usual: float) -> str:
-    """That pairs touch all the same, where the second side's places (n, 3) stand off along normals (n, 3)."""
-    along = np.einsum("nx,nx->n", normals, way) / np.linalg.norm(normals, axis=1)
-    if not abs(along).max(initial=0.0) > usual:
+def _clearance(found: Found, normals: Array, nodes: Nodes, ahead: Array | None) -> Array | None:
+    """How far the second side of each pair stands off along the unit normal, None where all touch."""
+    with_body, there = found.both[:, 1] > 0, found.others > 0
+    second = np.zeros((len(found.others), 3))
+    second[there] = nodes.coordinates[nodes.places(found.others[there])]
+    if ahead is not None:
+        second = second @ ahead.T
+    way = found.weights @ second - nodes.coordinates[nodes.places(found.both[:, 0])]
+    along = np.where(with_body, np.einsum("nx,nx->n", normals, way), 0.0)
+    return along if abs(along).max(initial=0.0) > reach_of(nodes, None) else None
+
+
+def _said(clearance: Array | None) -> str:
+    """That pairs which stand off touch all the same."""
+    if clearance is None:
         return ""
-    which = f"along the normals {along.min():.3g} to {along.max():.3g} (below zero they overlap)"
+    which = f"along the normals {clearance.min():.3g} to {clearance.max():.3g} (below zero they overlap)"
     return f"; {which}: the pairs touch all the same, unless the contact in the case has a `gap`"
 
 
@@ -315,7 +325,8 @@ def joined(
     if ahead is not None:
         B = {0: _stored(R @ own), 1: _stored(-R @ sp.kron(sp.identity(n), ahead) @ other)}
     points = None if nodes is None else nodes.coordinates[nodes.places(both[:, 0])]
-    return Pairs(B, areas=areas, points=points, frames=frames, nodes=both)
+    clearance = None if nodes is None else _clearance(found, normals, nodes, ahead)
+    return Pairs(B, areas=areas, points=points, frames=frames, nodes=both, clearance=clearance)
 
 
 def _stored(B: sp.spmatrix) -> sp.csr_matrix:

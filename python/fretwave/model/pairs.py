@@ -43,6 +43,9 @@ class Pairs:
         Places on the face [length], for pictures.
     nodes : (n_pairs, 2), optional
         First and second node of each pair in the mesh's own numbers, 0 for ground.
+    clearance : (n_pairs,), optional
+        How far the two sides stand apart in the mesh along the normal [length], below zero they overlap; None where
+        they touch. It is no gap of the contact, and an import alone knows it.
     """
 
     B: Term
@@ -54,6 +57,7 @@ class Pairs:
     faces: Optional[Sequence[str]] = None
     positions: Optional[Array] = None
     nodes: Optional[npt.NDArray[np.int64]] = None
+    clearance: Optional[Array] = None
 
     def __repr__(self) -> str:
         return f"Pairs({self.n_pairs} pairs of {self.components}, {', '.join(self.parameters)})"

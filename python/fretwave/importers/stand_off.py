@@ -1,0 +1,78 @@
+"""How far the two sides of a contact stand apart before a static step of CalculiX begins.
+
+Displacements alone do not say how far a pair is open in the end where its sides stand off, or overlap, in the mesh: a
+joint with clearance, a shrink fit. The step's deck may change that (G. Dhondt, CalculiX CrunchiX User's Manual,
+*CONTACT PAIR and *CLEARANCE): with ADJUST nodes that are no farther off begin on the other side, whereof the results
+hold no displacement, and *CLEARANCE puts its VALUE in place of the mesh's distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Optional
+
+import numpy as np
+
+from ..arrays import Array
+from .keywords import Lines, blocks
+
+#: Names of a contact's dependent and independent surface, capital letters.
+Sides = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class StandOff:
+    """What a deck says of the distance of two sides.
+
+    Attributes
+    ----------
+    adjusted : what is as far apart begins at zero [length]; of a node set inf
+    value : in place of the mesh's distance [length]
+    """
+
+    adjusted: float = -np.inf
+    value: Optional[float] = None
+
+    def of(self, clearance: Array) -> Array:
+        """The distances (n,) with which the step begins, from those of the mesh [length]."""
+        if self.value is not None:
+            return np.full(len(clearance), self.value)
+        return np.where(clearance > self.adjusted, clearance, 0.0)
+
+
+def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
+    """Of every contact pair in a deck; empty without one."""
+    adjusted: dict[Sides, float] = {}
+    values: dict[Sides, float] = {}
+    for keyword, options, data in blocks(deck) if deck.is_file() else ():
+        if keyword == "CONTACT PAIR":
+            adjusted.update(dict.fromkeys(_sides(data), _adjusted(options.get("ADJUST", ""))))
+        elif keyword == "CLEARANCE":
+            with suppress(ValueError):  # ccx would not have run with it
+                values[options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()] = float(options["VALUE"])
+    return {sides: StandOff(size, values.get(sides)) for sides, size in adjusted.items()}
+
+
+def of_sides(known: Mapping[Sides, StandOff], sides: Sequence[str]) -> StandOff:
+    """Of the contact between two sides, or where the deck has but one of that; else as the mesh has it."""
+    found = next((one for pair, one in known.items() if set(pair) == set(sides)), None)
+    only = next(iter(known.values())) if len(known) == 1 else StandOff()
+    return only if found is None else found
+
+
+def _sides(data: Lines) -> list[Sides]:
+    """Of the lines of a ``*CONTACT PAIR``: dependent, independent surface."""
+    found = [[word.strip().upper() for word in text.split(",")] for _, text in data]
+    return [(words[0], words[1]) for words in found if len(words) > 1]
+
+
+def _adjusted(text: str) -> float:
+    """The size that ADJUST names, of a node set inf."""
+    if not text:
+        return -np.inf
+    with suppress(ValueError):
+        return float(text)
+    return np.inf

@@ -1,0 +1,99 @@
+"""Sides that stand off or overlap in the mesh: the state at rest of a static contact step counts from there."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import test_import_at_rest as blocks
+from test_import_at_rest import KINDS, LENGTH, Block, N, ccx, heights, pressures, static_step, table
+
+from fretwave.importers.stand_off import StandOff, of_sides, read_stand_off
+
+pytestmark = blocks.pytestmark
+
+OVERLAP, APART = -1e-3, 1e-2
+
+
+@pytest.fixture
+def standing_off(monkeypatch):
+    """A function that lifts the upper block in the mesh."""
+
+    def lift(by: float) -> None:
+        upper = Block(blocks.HEIGHT + by, 1 + len(blocks.LOWER.number), 1 + len(blocks.LOWER.elements))
+        monkeypatch.setattr(sys.modules["test_import_at_rest"], "UPPER", upper)
+
+    return lift
+
+
+def imported(folder: Path, results: Path) -> dict[str, np.ndarray]:
+    assert blocks.imported(folder, results, "--tolerance", 0.05) == 0
+    return table(folder / "blocks_face.csv")
+
+
+def apart(results: Path, found: dict[str, np.ndarray], begins: float) -> np.ndarray:
+    """Of both nodes of each pair in the end, by their places."""
+    text = results.read_text()
+    u = heights(text[text.rindex(" -4  DISP") :])
+    return np.array([begins + u[b] - u[a] for a, b in zip(found["node_a"], found["node_b"])])
+
+
+@pytest.mark.parametrize(
+    ("kind", "by", "begins", "said"),
+    [
+        ("node", OVERLAP, OVERLAP, ""),
+        ("surface", OVERLAP, OVERLAP, ""),
+        ("surface", OVERLAP, 0.0, ", ADJUST=0."),
+        ("node", APART, 0.0, ", ADJUST=0.02"),
+        ("surface", APART, 0.0, ", ADJUST=0.02"),
+        ("surface", APART, OVERLAP, f"\n*CLEARANCE, SLAVE=A, MASTER=B, VALUE={OVERLAP}"),
+    ],
+)
+@pytest.mark.parametrize("lifted", [False, True])
+def test_what_is_open_counts_from_the_mesh(kind, by, begins, said, lifted, standing_off, tmp_path):
+    """Pairs that overlap are pressed, whatever way they moved; lifted ones are open by the distance in the end."""
+    standing_off(by)
+    named = KINDS[kind] + said if said.startswith(",") else KINDS[kind]
+    text = static_step(kind, lifted).replace(KINDS[kind], named)
+    text = text.replace("\nA, B\n", f"\nA, B{said}\n") if said.startswith("\n") else text
+    results = ccx(tmp_path, "static", text).with_suffix(".frd")
+    found, load = imported(tmp_path, results), pressures(lifted).sum() * (LENGTH / N) ** 2
+    assert found["normal_load"].sum() == pytest.approx(load, rel=1e-3)
+    opening = found["normal_load"] == 0
+    assert opening.sum() == (N + 1 if lifted else 0)
+    expected = np.where(opening, apart(results, found, begins), 0.0)
+    assert found["gap"] == pytest.approx(expected, rel=1e-2)  # as ccx rounds and offsets them
+    assert not lifted or found["gap"][opening].min() > 1e-5
+
+
+def test_pairs_that_the_results_leave_out_are_open_by_their_places(standing_off, tmp_path):
+    """ccx lists no contact at nodes along the edges; without the mesh's distance they would touch."""
+    standing_off(APART)
+    step = LENGTH / N
+    tops = [f"{n}, 3, 3, {-0.013 + 0.006 * step * p[1] / LENGTH}" for p, n in blocks.UPPER.number.items() if p[2]]
+    held = ["*BOUNDARY", "TOP, 1, 2", *tops, "*STATIC", "0.1, 1.", "*NODE FILE", "U", "*CONTACT FILE", "CDIS, CSTR"]
+    text = blocks.deck(held, blocks.CONTACT.format(kind=KINDS["node"]))
+    results = ccx(tmp_path, "static", text).with_suffix(".frd")
+    found = imported(tmp_path, results)
+    far = apart(results, found, APART)
+    opening = far > 1e-4
+    assert opening.sum() >= 2 * (N + 1)
+    assert found["gap"][opening] == pytest.approx(far[opening], rel=1e-2)
+
+
+def test_what_a_deck_says_of_the_distance(tmp_path):
+    """By the names of both sides, in whatever order; of a single contact whatever its names are."""
+    deck = tmp_path / "static.inp"
+    deck.write_text(
+        "*CONTACT PAIR, INTERACTION=DRY, ADJUST=Near\na, b\nE, F\n*CONTACT PAIR, INTERACTION=DRY, ADJUST=0.5\nC, D\n"
+        "*CONTACT PAIR, INTERACTION=DRY\nG, H\n*CLEARANCE, SLAVE=G, MASTER=H, VALUE=0.25\n"
+    )
+    known, mesh = read_stand_off(deck), np.array([-1.0, 0.4, 0.6])
+    assert of_sides(known, ("B", "A")).of(mesh).tolist() == of_sides(known, ("E", "F")).of(mesh).tolist() == [0.0] * 3
+    assert of_sides(known, ("C", "D")).of(mesh).tolist() == [0.0, 0.0, 0.6]
+    assert of_sides(known, ("G", "H")).of(mesh).tolist() == [0.25] * 3
+    assert of_sides(known, ("I", "J")).of(mesh).tolist() == mesh.tolist()
+    assert of_sides({("A", "B"): StandOff(0.5)}, ("I", "J")).of(mesh).tolist() == [0.0, 0.0, 0.6]
+    assert not read_stand_off(tmp_path / "none.inp")
