@@ -194,3 +194,30 @@ def test_curved_faces(tmp_path: Path) -> None:
     assert joint.areas.sum() == pytest.approx(np.pi / 2, rel=1e-3)
     turned = np.cross([1.0, 0, 0], nodes.coordinates).ravel()  # about the axis: what is off the face by its sagitta
     assert abs(joint.B @ turned).max() < 1e-3
+
+
+@pytest.mark.parametrize("kind", ["C3D20", "C3D15", "C3D10"])
+def test_a_set_that_lacks_a_middle_node_is_said(kind: str, tmp_path: Path) -> None:
+    """Whichever it is: the faces that are lost with it, by their number and the node; sets without corners are not."""
+    (text, x), corners = Box(kind, (3, 3, 2), (0, 0, 0), (2, 1, 1)).lines(1, "BODY"), (3 + 1) * (3 + 1) * (2 + 1)
+    top, faces = x[:, 2] == 1, 9 * (1 if kind == "C3D20" else 2)
+    for k in np.flatnonzero(top):
+        (tmp_path / "deck.inp").write_text(text + node_set("A", 1, top & (np.arange(len(x)) != k)))
+        side = side_of(read_nodes(tmp_path / "deck.inp"), "A")
+        lost = faces - sum(map(len, side.faces))
+        if k < corners:
+            assert not side.note
+        elif side.faces:
+            assert side.areas.sum() < 2.0 - 1e-2
+            assert side.note.startswith(f"{lost} face") and f"1 middle node ({1 + k})" in side.note
+        else:
+            assert f"1 middle node ({1 + k})" in side.note
+    (tmp_path / "deck.inp").write_text(text + node_set("A", 1, top))
+    assert not side_of(read_nodes(tmp_path / "deck.inp"), "A").note
+    (tmp_path / "deck.inp").write_text(text + node_set("A", 1, top & (np.arange(len(x)) < corners)))
+    nodes, notes = read_nodes(tmp_path / "deck.inp"), list[str]()
+    with pytest.raises(InputError, match="no normal") as caught:
+        match("foot", nodes, "A", "GROUND", None, labels_of(nodes))
+    assert f"{faces} faces of which all corners are in the set A are left out" in str(caught.value.measured)
+    match("foot", nodes, "A", "GROUND", np.array([0, 0, 1.0]), labels_of(nodes), notes=notes)
+    assert len(notes) == 1 and notes[0].startswith(f"contact 'foot': {faces} faces")

@@ -207,6 +207,19 @@ class Elements:
         bodies = _by_nodes(solids)
         return _by_nodes([*map(_alone, bodies), *(_beside(_alone(table), bodies) for table in _by_nodes(shells))])
 
+    def lacking_middles(self, nodes: IntArray) -> tuple[int, IntArray]:
+        """Free faces with all corners in a set but not all middle nodes: how many, and the nodes that it lacks."""
+        found = []
+        for kind, block in self.blocks.items():
+            for face in FACES[kind] if kind not in _SHELLS.values() else ():
+                table = block.nodes[:, face]
+                inside = np.isin(table, nodes)
+                corners = corners_of(len(face))
+                found.append(table[inside[:, :corners].all(axis=1) & ~inside.all(axis=1)])
+        tables = [_alone(table) for table in _by_nodes(found)]
+        reached = np.concatenate([np.zeros(0, dtype=np.int64), *(table.ravel() for table in tables)])
+        return sum(map(len, tables)), np.setdiff1d(reached, nodes)
+
 
 def _kind(name: str) -> tuple[str, int]:
     solid, shell = _SOLID.fullmatch(name), _SHELL.fullmatch(name)

@@ -22,7 +22,7 @@ from ..texts import counted
 from .nodes import Nodes
 from .overlap import overlap
 from .projection import project
-from .surfaces import Side, check_facing, normals_of, side_of
+from .surfaces import SHOWN, Side, check_facing, normals_of, side_of
 
 #: Nodes of a pair are this close, over the diagonal of the mesh, unless told.
 TOLERANCE = 1e-6
@@ -34,8 +34,6 @@ GROUND = "GROUND"
 NEXT = "@next"
 #: Share of the first side's nodes that lie on the second's faces at least: else it is another side that was meant.
 LEAST = 0.05
-#: Unmatched nodes that a message names.
-SHOWN = 8
 
 
 @dataclass(frozen=True)
@@ -106,19 +104,21 @@ def match(
     where = f"{nodes.where}, sets {first} and {second}"
     second, ahead = _without_next(second, turn, where)
     a, reach = side_of(nodes, first), reach_of(nodes, tolerance)
+    said = [a.note]
     if second.upper() == GROUND and GROUND not in nodes.sets:
         normals, both = normals_of(a, normal), np.column_stack([a.numbers, np.zeros_like(a.numbers)])
         found = Found(both, a.numbers[:0], sp.csr_matrix((len(both), 0)))
     else:
         b = _placed(a, side_of(nodes, second), turn, ahead, reach, where)
+        said.append(b.note)
         normals = normals_of(a, normal)
         found = _pair(a, b, normals, where, nodes, reach)
     areas = a.areas if found.areas is None else found.areas
     normals = normals if found.kept is None else normals[found.kept]
     pairs = joined(name, found, normals, areas, where, labels, nodes, tangent, ahead)
-    note = found.note + _said(pairs.clearance)
-    if notes is not None and note:
-        notes.append(f"contact '{name}': {note}")
+    said.insert(0, found.note + _said(pairs.clearance))
+    if notes is not None:
+        notes += [f"contact '{name}': {note}" for note in said if note]
     return pairs
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
-from ..texts import nearest
+from ..texts import counted, nearest
 from .nodes import Nodes, check_alike
 from .shapes import centre, gauss, node_places, shape_functions
 
@@ -17,6 +17,8 @@ from .shapes import centre, gauss, node_places, shape_functions
 ALIKE = 0.5
 #: Share of the middle's area element below which a corner has no normal of its own.
 SMALL = 1e-6
+#: Nodes that a message names.
+SHOWN = 8
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class Side:
         Places of their nodes among those of the side, seen from outside; empty unless every node is on one.
     bare : (n_bare,)
         Nodes on no face, beside others that are.
+    note : what is to be said of it, if anything
     """
 
     where: str
@@ -39,6 +42,7 @@ class Side:
     points: Array
     faces: list[IntArray]
     bare: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    note: str = ""
 
     @property
     def name(self) -> str:
@@ -85,7 +89,7 @@ def side_of(nodes: Nodes, name: str) -> Side:
         There is neither of this name, or a surface names an element or face that is none.
     """
     if name.upper() in nodes.elements.surfaces:
-        where = f"{nodes.where}, surface {name}"
+        where, note = f"{nodes.where}, surface {name}", ""
         tables = nodes.elements.faces(name.upper(), nodes.where)
         numbers = np.unique(np.concatenate([table.ravel() for table in tables] or [np.zeros(0, dtype=np.int64)]))
         if name.upper() in nodes.sets:
@@ -93,14 +97,25 @@ def side_of(nodes: Nodes, name: str) -> Side:
     else:
         where = f"{nodes.where}, set {name}"
         numbers = _node_set(nodes, name)
-        tables = nodes.elements.free_faces(numbers)
+        tables, note = nodes.elements.free_faces(numbers), _lacking(nodes, name, numbers)
     if not len(numbers):
         expected, fix = "faces of C3D or S elements, or nodes", "check the set in the deck"
         raise InputError("a side of the contact is empty", where, "no nodes", expected, fix)
     bare = np.setdiff1d(numbers, np.concatenate([table.ravel() for table in tables])) if tables else numbers
     order = np.argsort(numbers)
     places = [order[np.searchsorted(numbers, table, sorter=order)] for table in tables] if not len(bare) else []
-    return Side(where, numbers, nodes.coordinates[nodes.places(numbers)], places, bare if tables else bare[:0])
+    points = nodes.coordinates[nodes.places(numbers)]
+    return Side(where, numbers, points, places, bare if tables else bare[:0], note)
+
+
+def _lacking(nodes: Nodes, name: str, numbers: IntArray) -> str:
+    """Said of a node set that has the corners of faces without their middle nodes: their area is lost."""
+    count, middles = nodes.elements.lacking_middles(numbers)
+    if not count:
+        return ""
+    shown = ", ".join(map(str, middles[:SHOWN])) + (", ..." if len(middles) > SHOWN else "")
+    faces = f"{counted(count, 'face')} of which all corners are in the set {name} {'is' if count == 1 else 'are'}"
+    return f"{faces} left out, for it lacks {counted(len(middles), 'middle node')} ({shown}): name a *SURFACE instead"
 
 
 def has_faces(nodes: Nodes, name: str) -> bool:
@@ -164,6 +179,7 @@ def normals_of(side: Side, given: Array | None) -> Array:
         fix = "give --normal X,Y,Z from the first body to the second, a *SURFACE, or a CSV of pairs with normals"
         bare = len(side.bare)
         measured = f"node {side.bare[0]} is on no face, {bare} of {len(side.numbers)} such" if bare else None
+        measured = "; ".join(filter(None, [measured, side.note])) or None
         raise InputError("the pairs have no normal", side.where, measured, expected, fix)
     if given is None or own is None:
         return np.broadcast_to(given, (len(side.numbers), 3)) if own is None else own  # type: ignore[arg-type]
