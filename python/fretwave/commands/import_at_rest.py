@@ -7,11 +7,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Union
 
+import numpy as np
+
 from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..files.csv_table import write_columns
-from ..importers.contact_results import at_rest, read_step
+from ..importers.contact_results import Nodal, at_rest, read_step, surfaces
 from ..importers.formats import readable
+from ..importers.nodes import Nodes
+from ..importers.pairs import GROUND
+from ..importers.spring_areas import spring_areas
+from ..importers.surfaces import side_of
 from ..model.law_info import Role
 from ..model.laws import usual_name
 from ..model.structure import Structure
@@ -20,7 +26,7 @@ from ..model.structure import Structure
 Table = tuple[Path, Mapping[str, Union[Array, IntArray]]]
 
 
-def tables_at_rest(options: argparse.Namespace, model: Structure, notes: list[str]) -> list[Table]:
+def tables_at_rest(options: argparse.Namespace, model: Structure, nodes: Nodes | None, notes: list[str]) -> list[Table]:
     """A table for each contact; what was found is added to the notes. One rank.
 
     Raises
@@ -38,10 +44,21 @@ def tables_at_rest(options: argparse.Namespace, model: Structure, notes: list[st
     given = [[words[0].rpartition("=")[2], *words[1:]] for words in options.pairs]
     tables: list[Table] = []
     for (name, pairs), sides in zip(model.pairs.items(), given):
-        found = at_rest(name, pairs, step, model.labels, sides, len(model.pairs) == 1)
+        springs = [] if nodes is None or len(sides) == 1 else [_springs(nodes, side) for side in sides]
+        found = at_rest(name, pairs, step, model.labels, sides, len(model.pairs) == 1, springs)
         notes.append(found.said(name, pairs))
         tables.append((options.out.with_name(f"{options.out.stem}_{name}.csv"), found.columns(pairs)))
     return tables
+
+
+def _springs(nodes: Nodes, name: str) -> Nodal:
+    """Areas of the nodes of a side of the contact, of none where no faces are known."""
+    (name,) = surfaces([name])
+    if name == GROUND and name not in nodes.sets:
+        return Nodal(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
+    side = side_of(nodes, name)
+    order = np.argsort(side.numbers) if side.faces else np.zeros(0, dtype=np.intp)
+    return Nodal(side.numbers[order], spring_areas(side)[order, None])
 
 
 def write_tables(tables: Sequence[Table], model: Structure) -> None:

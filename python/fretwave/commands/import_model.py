@@ -51,9 +51,9 @@ ROLES = {"M": "mass", "K": "stiffness", "C": "damping"}
 
 def import_model(options: argparse.Namespace, comm: MPI.Comm) -> int:
     """Read, check, write, report. Collective; rank 0 reads and writes."""
-    model, found, materials = on_first_rank(comm, lambda: read_parts(options))
-    loaded = on_first_rank(comm, lambda: tables_at_rest(options, model, found.notes))
-    evidence = on_first_rank(comm, lambda: _checked_units(model, materials))
+    model, found, nodes = on_first_rank(comm, lambda: read_parts(options))
+    loaded = on_first_rank(comm, lambda: tables_at_rest(options, model, nodes, found.notes))
+    evidence = on_first_rank(comm, lambda: _checked_units(model, [] if nodes is None else nodes.materials))
     report = check(model, found.symmetry, found.notes, evidence, options.modes, comm, found.warnings)
     on_first_rank(comm, lambda: write_model(options.out, model, sources=_sources(options)))
     on_first_rank(comm, lambda: write_tables(loaded, model))
@@ -71,8 +71,8 @@ def _checked_units(model: Structure, materials: Sequence[Material]) -> list[Evid
     return evidence
 
 
-def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[Material]]:
-    """The model that the options describe, and materials that tell its units. One rank.
+def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, Nodes | None]:
+    """The model that the options describe, and the nodes that it is of. One rank.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     found.warnings += check_unjoined(model, where)
     if wheel is not None and nodes is not None:
         found.warnings += check_untied(model, wheel, nodes, options.tolerance)
-    return model, found, [] if nodes is None else nodes.materials
+    return model, found, nodes
 
 
 def _take_deck(options: argparse.Namespace) -> None:

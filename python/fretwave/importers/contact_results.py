@@ -2,13 +2,13 @@
 
 ``*CONTACT FILE`` with CDIS, CSTR writes the block CONTACT of a .frd file: at the nodes of the dependent (slave) side
 COPEN [length] (> 0 open), CSLIP1, CSLIP2 [length], CPRESS, CSHEAR1, CSHEAR2 [pressure]. A pair's forces are its area
-times those. Of contact from node to surface they are the nodes' own; nodes that are far open may be left out: the block
-DISP tells their gaps, with the distance in the mesh (`stand_off`). Of that from surface to surface they are
-extrapolated from inside of the faces, and to nodes that DISP shows apart as well, which are open; ``*CONTACT PRINT,
-SLAVE=.., MASTER=..`` with CF then writes the exact force of the whole contact into the .dat file beside, to which the
-pairs' forces are scaled. Which it is the step's deck tells when it stands beside; without it a node that is listed as
-open, which only contact from node to surface does. A .dat file alone will do where ``*CONTACT PRINT`` with CDIS, CSTR
-wrote the slave nodes into it (node to surface). The last step of a file counts.
+times those. Of contact from node to surface they are the nodes' own, with areas of their own (`spring_areas`); nodes
+that are far open may be left out: the block DISP tells their gaps, with the distance in the mesh (`stand_off`). Of that
+from surface to surface they are extrapolated from inside of the faces, and to nodes that DISP shows apart as well,
+which are open; ``*CONTACT PRINT, SLAVE=.., MASTER=..`` with CF then writes the exact force of the whole contact into
+the .dat file beside, to which the pairs' forces are scaled. Which it is the step's deck tells when it stands beside;
+without it a node that is listed as open, which only contact from node to surface does. A .dat file alone will do where
+``*CONTACT PRINT`` with CDIS, CSTR wrote the slave nodes into it (node to surface). The last step of a file counts.
 """
 
 from __future__ import annotations
@@ -221,7 +221,13 @@ class PairsAtRest:
 
 
 def at_rest(
-    name: str, pairs: Pairs, step: StaticStep, labels: IntArray, sides: Sequence[str] = (), alone: bool = True
+    name: str,
+    pairs: Pairs,
+    step: StaticStep,
+    labels: IntArray,
+    sides: Sequence[str] = (),
+    alone: bool = True,
+    springs: Sequence[Nodal] = (),
 ) -> PairsAtRest:
     """Forces and gaps of the pairs, from the side that has results.
 
@@ -230,6 +236,7 @@ def at_rest(
     labels : (n_dof, 2) node and direction of each dof
     sides : names of both sides, as the model was given them
     alone : the model has no other contact
+    springs : areas (n, 1) of the nodes of each side by which ccx makes forces from node to surface, where known
 
     Raises
     ------
@@ -242,8 +249,9 @@ def at_rest(
         fix = "give sets on faces of the mesh to --pairs, or a CSV with areas"
         raise InputError("forces need the areas of the pairs", where, None, "areas and nodes of the pairs", fix)
     found = [step.contact.at(np.asarray(side)) for side in np.transpose(pairs.nodes)]
-    values = max(found, key=lambda side: np.count_nonzero(side[:, PRESSURE] > 0))
-    pressed, areas = values[:, PRESSURE] > 0, np.asarray(pairs.areas)
+    told = int(np.argmax([np.count_nonzero(side[:, PRESSURE] > 0) for side in found]))
+    values, areas = found[told], _areas(pairs, told, springs if step.at_nodes else ())
+    pressed = values[:, PRESSURE] > 0
     if not pressed.any():
         known = int(np.count_nonzero(~np.isnan([side[:, PRESSURE] for side in found]).all(axis=0)))
         measured = f"results at the nodes of {known} of {counted(len(areas), 'pair')}, none with a pressure"
@@ -260,6 +268,15 @@ def at_rest(
     first, other = (values[:, OPENING], apart) if step.at_nodes else (apart, values[:, OPENING])
     gap = np.where(pressed, 0.0, _gaps(np.where(np.isnan(first), other, first), where, ~pressed))
     return PairsAtRest(scale * normal, scale * shear, gap, scale, opened)
+
+
+def _areas(pairs: Pairs, told: int, springs: Sequence[Nodal]) -> Array:
+    """What the pressures of one side, first or second, are to be multiplied by (n_pairs,) [length^2]."""
+    own, nodes = np.asarray(pairs.areas), np.asarray(pairs.nodes)[:, told]
+    if len(springs) <= told or not len(springs[told].numbers) or len(np.unique(nodes)) < len(nodes):
+        return own
+    known = springs[told].at(nodes)[:, 0]
+    return np.where(np.isnan(known), own, known)
 
 
 def _opened(open_: npt.NDArray[np.bool_], forces: Array, printed: float | None, where: str) -> str:
