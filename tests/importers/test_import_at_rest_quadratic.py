@@ -84,6 +84,20 @@ def test_the_forces_are_the_load_and_those_of_the_stiffness(kind, cells, tmp_pat
     np.testing.assert_allclose(found["normal_load"], own, atol=1e-3 * own.max())
 
 
+@pytest.mark.parametrize("kind", ["C3D8", "C3D10"])
+def test_pressures_of_the_second_side_need_meshes_that_match(kind, tmp_path, capsys):
+    """Those of the nearest nodes are not the load; the other way round they are."""
+    results, load = pressed(tmp_path, kind, (2, 2, 1))
+    capsys.readouterr()
+    given = ("--units", "mm-t-s", "--at-rest", results)
+    assert call("import", tmp_path / "boxes.inp", "--pairs", "face=B", "A", *given) == 2
+    said = capsys.readouterr().err
+    assert "the pressures are at nodes of the second side" in said and "fix:      write A B" in said
+    assert said.count("fix:") == 1
+    assert call("import", tmp_path / "boxes.inp", "--pairs", "face=A", "B", *given) == 0
+    assert table(tmp_path / "boxes_face.csv")["normal_load"].sum() == pytest.approx(load, rel=1e-3)
+
+
 @pytest.mark.parametrize("count", [3, 4, 6, 8])
 def test_shares_of_a_face_are_all_of_it(count):
     assert shares(count).sum() == pytest.approx(1.0, rel=1e-14)

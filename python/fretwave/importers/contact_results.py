@@ -250,6 +250,8 @@ def at_rest(
         raise InputError("forces need the areas of the pairs", where, None, "areas and nodes of the pairs", fix)
     found = [step.contact.at(np.asarray(side)) for side in np.transpose(pairs.nodes)]
     told = int(np.argmax([np.count_nonzero(side[:, PRESSURE] > 0) for side in found]))
+    printed, opened = step.force(sides, alone), ""
+    _check_side(pairs, told, springs, printed, where, sides)
     values, areas = found[told], _areas(pairs, told, springs if step.at_nodes else ())
     pressed = values[:, PRESSURE] > 0
     if not pressed.any():
@@ -257,7 +259,7 @@ def at_rest(
         measured = f"results at the nodes of {known} of {counted(len(areas), 'pair')}, none with a pressure"
         fix = "check the sets of --pairs, and that the step presses them together"
         raise InputError("no pair of the contact is pressed", where, measured, "a pressure above 0 at some node", fix)
-    apart, printed, opened = step.begins_at(pairs, sides) + _apart(pairs, step, labels), step.force(sides, alone), ""
+    apart = step.begins_at(pairs, sides) + _apart(pairs, step, labels)
     if not step.at_nodes:
         open_ = pressed & (apart > 0)  # a pressure there is extrapolated from beside
         opened = _opened(open_, np.where(pressed, areas * values[:, PRESSURE], 0.0), printed, where)
@@ -268,6 +270,26 @@ def at_rest(
     first, other = (values[:, OPENING], apart) if step.at_nodes else (apart, values[:, OPENING])
     gap = np.where(pressed, 0.0, _gaps(np.where(np.isnan(first), other, first), where, ~pressed))
     return PairsAtRest(scale * normal, scale * shear, gap, scale, opened)
+
+
+def _check_side(
+    pairs: Pairs, told: int, springs: Sequence[Nodal], printed: float | None, where: str, sides: Sequence[str]
+) -> None:
+    """Pressures of the second side are those of the pairs node by node, or the whole force is known.
+
+    Raises
+    ------
+    InputError
+        The meshes of both sides do not match: the nearest nodes' pressures do not make the load.
+    """
+    if told == 0 or printed is not None or len(springs) < 2:
+        return
+    partners, known = np.asarray(pairs.nodes)[:, 1], springs[1].numbers
+    if len(known) and sorted(partners.tolist()) != known.tolist():
+        measured = f"{counted(len(np.unique(partners)), 'node')} of {len(known)} of {sides[1]} beside a pair"
+        fix = f"write {sides[1]} {sides[0]}: the dependent side of *CONTACT PAIR first"
+        what, expected = "the pressures are at nodes of the second side", "one pair at each of them, where it tells"
+        raise InputError(what, where, measured, expected, fix)
 
 
 def _areas(pairs: Pairs, told: int, springs: Sequence[Nodal]) -> Array:
