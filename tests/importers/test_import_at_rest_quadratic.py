@@ -98,6 +98,19 @@ def test_pressures_of_the_second_side_need_meshes_that_match(kind, tmp_path, cap
     assert table(tmp_path / "boxes_face.csv")["normal_load"].sum() == pytest.approx(load, rel=1e-3)
 
 
+@pytest.mark.parametrize("kind", ["C3D8", "C3D20"])
+def test_a_dependent_surface_of_nodes_is_refused(kind, tmp_path, capsys):
+    """Its springs have the outer faces around the corner too: the sum would be a quarter, or half, of the load less."""
+    results, _ = pressed(tmp_path, kind, (3, 3, 1))
+    deck = results.with_suffix(".inp")
+    deck.write_text(deck.read_text() + "*SURFACE, NAME=A, TYPE=NODE\nTOP\n")
+    capsys.readouterr()
+    given = ("--pairs", "face=A", "B", "--units", "mm-t-s", "--at-rest", results)
+    assert call("import", tmp_path / "boxes.inp", *given) == 2
+    said = capsys.readouterr().err
+    assert "the dependent side is a surface of nodes" in said and said.count("fix:") == 1
+
+
 @pytest.mark.parametrize("count", [3, 4, 6, 8])
 def test_shares_of_a_face_are_all_of_it(count):
     assert shares(count).sum() == pytest.approx(1.0, rel=1e-14)

@@ -91,7 +91,14 @@ class StaticStep:
     def begins_at(self, pairs: Pairs, sides: Sequence[str]) -> Array:
         """How far the sides of each pair are apart as the step begins (n_pairs,) [length], below zero they overlap."""
         mesh = np.zeros(pairs.n_pairs) if pairs.clearance is None else np.asarray(pairs.clearance)
-        return of_sides(self.stand_off, surfaces(sides)).of(mesh)
+        return self._told(sides).of(mesh)
+
+    def springs_of_nodes(self, sides: Sequence[str]) -> bool:
+        """The pressures are those of springs at nodes that the deck names without faces."""
+        return self.at_nodes and self._told(sides).of_nodes
+
+    def _told(self, sides: Sequence[str]) -> StandOff:
+        return of_sides(self.stand_off, surfaces(sides))
 
 
 def surfaces(sides: Sequence[str]) -> tuple[str, ...]:
@@ -251,7 +258,7 @@ def at_rest(
     found = [step.contact.at(np.asarray(side)) for side in np.transpose(pairs.nodes)]
     told = int(np.argmax([np.count_nonzero(side[:, PRESSURE] > 0) for side in found]))
     printed, opened = step.force(sides, alone), ""
-    _check_side(pairs, told, springs, printed, where, sides)
+    _check_side(pairs, told, springs, step, alone, sides, where)
     values, areas = found[told], _areas(pairs, told, springs if step.at_nodes else ())
     pressed = values[:, PRESSURE] > 0
     if not pressed.any():
@@ -273,16 +280,22 @@ def at_rest(
 
 
 def _check_side(
-    pairs: Pairs, told: int, springs: Sequence[Nodal], printed: float | None, where: str, sides: Sequence[str]
+    pairs: Pairs, told: int, springs: Sequence[Nodal], step: StaticStep, alone: bool, sides: Sequence[str], where: str
 ) -> None:
     """Pressures of the second side are those of the pairs node by node, or the whole force is known.
 
     Raises
     ------
     InputError
-        The meshes of both sides do not match: the nearest nodes' pressures do not make the load.
+        The meshes of both sides do not match: the nearest nodes' pressures do not make the load. Or the dependent side
+        is named node by node: ccx then takes areas of all outer faces at each node, those around the corner too, and
+        of quadratic elements others still, by which the pressures are too low.
     """
-    if told == 0 or printed is not None or len(springs) < 2:
+    if step.springs_of_nodes(sides):
+        fix = "give *SURFACE, TYPE=ELEMENT with the faces to the dependent side, and run ccx again"
+        what, expected = "the dependent side is a surface of nodes", "faces, whose areas make forces of pressures"
+        raise InputError(what, where, "*SURFACE, TYPE=NODE in the step's deck", expected, fix)
+    if told == 0 or step.force(sides, alone) is not None or len(springs) < 2:
         return
     partners, known = np.asarray(pairs.nodes)[:, 1], springs[1].numbers
     if len(known) and sorted(partners.tolist()) != known.tolist():

@@ -31,10 +31,12 @@ class StandOff:
     ----------
     adjusted : what is as far apart begins at zero [length]; of a node set inf
     value : in place of the mesh's distance [length]
+    of_nodes : the dependent surface is one of nodes (``*SURFACE, TYPE=NODE``)
     """
 
     adjusted: float = -np.inf
     value: Optional[float] = None
+    of_nodes: bool = False
 
     def of(self, clearance: Array) -> Array:
         """The distances (n,) with which the step begins, from those of the mesh [length]."""
@@ -47,13 +49,16 @@ def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
     """Of every contact pair in a deck; empty without one."""
     adjusted: dict[Sides, float] = {}
     values: dict[Sides, float] = {}
+    nodal = set[str]()
     for keyword, options, data in blocks(deck) if deck.is_file() else ():
         if keyword == "CONTACT PAIR":
             adjusted.update(dict.fromkeys(_sides(data), _adjusted(options.get("ADJUST", ""))))
         elif keyword == "CLEARANCE":
             with suppress(ValueError):  # ccx would not have run with it
                 values[options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()] = float(options["VALUE"])
-    return {sides: StandOff(size, values.get(sides)) for sides, size in adjusted.items()}
+        elif keyword == "SURFACE" and options.get("TYPE", "").upper() == "NODE":
+            nodal.add(options.get("NAME", "").upper())
+    return {sides: StandOff(size, values.get(sides), sides[0] in nodal) for sides, size in adjusted.items()}
 
 
 def of_sides(known: Mapping[Sides, StandOff], sides: Sequence[str]) -> StandOff:
