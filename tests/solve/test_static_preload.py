@@ -301,3 +301,23 @@ def test_residual_of_the_static_problem_is_the_balance(comm):
         r = whole(problem.residual(unknowns(problem, np.array([x / size, 0.5]))))
         balance = K * x + KN * max(0.0, x - 0.4) - 0.5 * 2.0
         assert r == pytest.approx(balance / problem.force_scale, rel=ROUNDING)
+
+
+@pytest.mark.parametrize("seed", [8, 42, 108])
+def test_a_history_far_from_its_equilibrium(comm, seed):
+    """Sliders that stand elsewhere move the structure before any load: Newton finds that as they go there in steps."""
+    rng, n, pairs = np.random.default_rng(seed), 4, 3
+    A = rng.normal(size=(n, n))
+    stiffness, B = A @ A.T + 0.1 * np.eye(n), rng.normal(size=(2 * pairs, n))
+    kn = 10 ** rng.uniform(-1, 2, pairs)
+    N0 = rng.uniform(0.5, 3, pairs)
+    given = {"normal_stiffness": kn, "tangential_stiffness": 0.7 * kn, "friction_coefficient": 0.4, "normal_load": N0}
+    model = fw.Model(np.eye(n), stiffness, None, [fw.Contact("coulomb_2d", B, given, "pads")], comm)
+    load, history = rng.normal(size=n), rng.normal(size=(pairs, 1))
+    rest = static_preload(model, load, sliders={"pads": history})
+    u, v = (B @ rest.displacement).reshape(-1, 2).T
+    N = np.maximum(N0 + kn * u, 0.0)
+    T = np.clip(0.7 * kn * (v - history[:, 0]), -0.4 * N, 0.4 * N)
+    left = stiffness @ rest.displacement + B.T @ np.column_stack([N, T]).ravel() - load - B[::2].T @ N0
+    assert np.linalg.norm(left) < SOLVED * np.linalg.norm(load)
+    assert 0.7 * kn * (v - rest.sliders["pads"][:, 0]) == pytest.approx(T, abs=SOLVED)

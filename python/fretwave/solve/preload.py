@@ -34,6 +34,8 @@ UNHELD = 1e-10
 RIGID = 1e-6
 #: Of the reference mode's stiffness: what is softer than that is rounding of the stiff contact beside it.
 SOFTEST = 1e-8
+#: Shares of the sliders' way in which Newton goes with them.
+WAYS_OF_SLIDERS = ([1.0], np.linspace(1, 0, 16, endpoint=False)[::-1].tolist())
 #: Times the reference mode's displacement under the load: one that is larger at first is measured by itself, for a step
 #: is at most half of what displacements are measured by.
 FAR = 100.0
@@ -150,9 +152,9 @@ def static_preload(
 
     def begin(times: float) -> tuple[StaticPreload, Continuation]:
         problem = StaticPreload(model, load, reference, rest.load, times=times)
-        if history is not None:
-            problem.core.stand(history)
         start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
+        if history is not None:
+            start = _moved_by(problem, history, start, control)
         return problem, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
 
     problem, branch = begin(1.0)
@@ -187,6 +189,27 @@ def static_preload(
         "1",
         "hold the structure where contact alone cannot (an axial stop), or lower the load",
     )
+
+
+def _moved_by(problem: StaticPreload, history: list[list[float]], start: PETSc.Vec, control: StepControl) -> PETSc.Vec:
+    """Where the structure begins with its sliders at a history, which moves it without load. Collective.
+
+    Newton finds that from where no slider has moved, or as they go there in steps.
+    """
+    for shares in WAYS_OF_SLIDERS:
+        y: PETSc.Vec | None = start
+        for share in shares:
+            problem.core.stand([[share * w for w in sliders] for sliders in history])
+            way = Continuation(problem, y, (-1.0, 1.0), control, upwards=True, way=True)
+            point = next(way, None)
+            y = None if point is None else point.y.copy()
+            way.destroy()
+            if y is None:
+                break
+        if y is not None:
+            return y
+    problem.core.stand(history)
+    return start
 
 
 def _times(first: Point | None, branch: Continuation) -> float:
