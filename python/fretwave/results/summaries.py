@@ -149,7 +149,7 @@ def _amplified(attributes: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
         yield f"amplification_{row['contact']}_{row['mode']}", math.nan if value is None else float(value)
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
