@@ -71,6 +71,19 @@ def test_linear_frequencies_in_closed_form(tmp_path: Path, capsys) -> None:
     assert "linear: tangential_stiffness = 3.0: 2 points" in capsys.readouterr().out
 
 
+def test_values_with_fewer_modes_than_others_are_shown_as_they_were_told(tmp_path: Path, capsys) -> None:
+    """In results.h5 nan stands for the modes that they lack: these were counted."""
+    linear = '[[analysis]]\nname = "linear"\ntype = "linear"\n'
+    run = swept(tmp_path, CASE + linear, 'linear.contact=["stuck"],["stuck","free"]', "linear")
+    told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("linear: contact")]
+    assert [line.rpartition(": ")[2] for line in told] == [
+        "1 mode, 0.225079 to 0.225079 Hz",
+        "2 modes, 0.159155 to 0.225079 Hz",
+    ]
+    assert call("show", run) == 0
+    assert [line for line in capsys.readouterr().out.splitlines() if line in told] == told
+
+
 def test_wear_by_amplitude(tmp_path: Path, capsys) -> None:
     """First and last row of each amplitude, and the volume of all faces."""
     path = write_case(tmp_path)

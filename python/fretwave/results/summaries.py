@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..columns import Column
 from ..post.decays import LIMIT_CYCLE
 from ..post.mode_curve import most_damped, without_rounding
+from ..texts import counted
 from .sweep_summary import Row, Summary, Table
 
 #: Attribute of a linear analysis with engine order: its table of amplifications, as JSON.
@@ -154,12 +155,16 @@ def _text(value: object) -> str:
 
 
 def _linear_words(row: Row) -> str:
-    hz, factors = ([row[key] for key in row if key.startswith(column.name)] for column in reversed(LINEAR))
+    factors, hz = (_known(row, column.name) for column in LINEAR)
     if not hz:
         raise KeyError(LINEAR[1].name)
-    known = [value for value in factors if math.isfinite(value)]
-    words = f"{len(hz)} modes, {min(hz):.6g} to {max(hz):.6g} Hz"
-    return words + (f"; largest amplification {max(known):.4f}" if known else "")
+    words = f"{counted(len(hz), 'mode')}, {min(hz):.6g} to {max(hz):.6g} Hz"
+    return words + (f"; largest amplification {max(factors):.4f}" if factors else "")
+
+
+def _known(row: Row, begin: str) -> list[float]:
+    """Numbers whose names begin so; nan stands in results.h5 where another value has more of them."""
+    return [row[key] for key in row if key.startswith(begin) and math.isfinite(row[key])]
 
 
 WEAR_LINES = Summary(WEAR, _wear, _wear_words, "line", spread=("last_zeta", "last_frequency_hz", "worn_volume"))
