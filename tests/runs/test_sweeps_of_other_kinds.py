@@ -18,6 +18,30 @@ from fretwave.results.file import rewritten
 pytestmark = pytest.mark.ranks(1)
 
 SECTORS = 6
+#: A mass that its contact alone holds along the tangent.
+PULLED = """
+import numpy as np, scipy.sparse as sp, fretwave as fw
+
+def build(force):
+    K = sp.csr_matrix(np.diag([1.0, 1e-14]))
+    return fw.Structure(sp.eye(2, format="csr"), K, dofs={"n": 0, "t": 1}, loads={"pull": np.array([0.0, force])})
+"""
+PULLED_FACE = """
+[[contact]]
+name = "face"
+law = "coulomb_2d"
+pairs = ["n"]
+tangents = ["t"]
+normal_stiffness = 3.0
+tangential_stiffness = 2.0
+friction_coefficient = 0.5
+normal_load = 4.0
+
+[[analysis]]
+name = "rest"
+type = "static"
+factors = [0.5, 1.0, 1.5]
+"""
 
 
 def rows(path: Path, **chosen: str) -> list[dict[str, str]]:
@@ -29,11 +53,11 @@ def column(path: Path, key: str, **chosen: str) -> np.ndarray:
     return np.array([float(row[key]) for row in rows(path, **chosen)])
 
 
-def swept(folder: Path, text: str, over: str, *only: str) -> Path:
+def swept(folder: Path, text: str, over: str, *only: str, exit_code: int = 0) -> Path:
     """The run; summaries are of the last of the analyses."""
     (folder / "case.toml").write_text(text)
     words = ["--over", over, "--only", ",".join(only), "--out", folder / "run"]
-    assert call("sweep", folder / "case.toml", *words) == 0
+    assert call("sweep", folder / "case.toml", *words) == exit_code
     return folder / "run"
 
 
@@ -115,6 +139,17 @@ def test_states_at_rest(tmp_path: Path, capsys) -> None:
     assert column(run / "summary.csv", "normal_force") == pytest.approx([1.0, 2.5], rel=SOLVED)
     assert column(run / "summary.csv", "open_share").tolist() == [0.0, 0.0]
     assert "rest: normal_load = 2.5, factor 1: 0 % of the pairs slip, 0 % are open" in capsys.readouterr().out
+
+
+def test_factors_that_are_solved_came_to_their_end(tmp_path: Path) -> None:
+    """A pair alone holds t up to mu N = 2: beyond it nothing is in balance, whatever the factors before it say."""
+    (tmp_path / "model.py").write_text(PULLED)
+    text = '[model]\nbuilder = "model.py"\n[preload]\nloads = ["pull"]\n' + PULLED_FACE
+    run = swept(tmp_path, text, "model.options.force=1.0,1.5", "rest", exit_code=3)
+    summary = run / "summary.csv"
+    assert column(summary, "factor").tolist() == [0.5, 1.0, 1.5, 0.5, 1.0]
+    assert column(summary, "done").tolist() == [1, 1, 1, 1, 1]
+    assert column(summary, "normal_force") == pytest.approx(5 * [4.0], rel=SOLVED)
 
 
 def test_decays_by_start(tmp_path: Path, capsys) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal, Optional
 
@@ -16,6 +17,7 @@ from ..errors import InputError, NotConverged
 from ..model.contact import Contact
 from ..model.law_info import STATUS
 from ..post.contact_history import normal_force, tangential_force
+from ..results.file import ENDED
 from ..results.summaries import STATES_AT_REST
 from .parts.at_rest import static_at_rest
 from .parts.context import AnalysisContext, Outcome
@@ -76,6 +78,7 @@ class StaticAnalysis(AnalysisSection):
         context.leave_out([] if section_loads(context) else ["static loads (there are none: only the pairs' own act)"])
         writer = context.writer(COLUMNS)
         summary: list[str] = []
+        solved: list[float] = []
         failure = None
         try:
             for factor in sorted(self.factors):
@@ -83,12 +86,13 @@ class StaticAnalysis(AnalysisSection):
                 for row in _rows(context, rest, factor):
                     writer.append({**row, "point": writer.rows})
                 summary += _summary(context, rest, factor)
+                solved.append(factor)
         except NotConverged as error:
             failure = error
         reason = "all factors solved" if failure is None else f"factor {factor:g}: {failure.measured}"
         if writer.rows:
             keep_pairs(context, writer)
-        writer.close("done" if failure is None else "stopped", reason)
+        writer.close("done" if failure is None else "stopped", reason, **{ENDED: json.dumps(solved)})
         advice = failure.fix or "" if failure is not None else ""
         return Outcome(writer.rows, reason, failure is None, summary, "a static state at every load factor", advice)
 
