@@ -166,6 +166,21 @@ def test_decays_by_start(tmp_path: Path, capsys) -> None:
     assert "decay: C = [[0.04]], start 1: half of it after 34.65" in capsys.readouterr().out
 
 
+def test_damping_is_that_of_cycles_between_others(tmp_path: Path, capsys) -> None:
+    """Damped by 45 %, more by friction: two cycles above the noise, of which the first one's decrement is -12 %."""
+    text = CASE.replace(*MEMORYLESS).replace("friction_limit = 1.0", "friction_limit = 0.05", 1)
+    text = text.replace("K = [[1.0]]\n", "K = [[1.0]]\nC = [[0.9]]\n")
+    decay = '[[analysis]]\nname = "decay"\ntype = "free_decay"\nmode = "mode"\namplitude = [4.0]\nperiods = 20\n'
+    run = swept(tmp_path, text + decay, "model.C=[[0.01]],[[0.9]]", "mode", "decay")
+    zeta = column(run / "summary.csv", "largest_zeta", analysis="decay")
+    assert np.isnan(zeta[1]) and zeta[0] > 0.005
+    for value in range(2):
+        cycles = column(run / f"values/{value:04d}/decay.csv", "zeta")
+        assert len(cycles) < 3 if np.isnan(zeta[value]) else zeta[value] == cycles[1:-1].max()
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("decay: C = [[0.9]]")]
+    assert "zeta" not in line and line.endswith(" at the end")
+
+
 def test_limit_cycles_by_start(tmp_path: Path, capsys) -> None:
     """Negative damping against the friction of a weak limit: Coulomb's amplitude 4 F / (pi |c| omega) is unstable.
 

@@ -43,7 +43,7 @@ LIMIT = (
 )
 DECAY = (
     Column("half_time", "s", "time in which the first cycle's amplitude falls to its half"),
-    Column("largest_zeta", "1", "largest damping ratio of a cycle"),
+    Column("largest_zeta", "1", "largest damping ratio of a cycle between two others"),
     Column("last_amplitude", "length", "amplitude of the last cycle"),
 )
 #: Of linear modes, by contact and number, which end the name: ``hz_stuck_1``.
@@ -112,10 +112,11 @@ def _limit_cycle_words(row: Row) -> str:
 
 
 def _decay(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
-    zeta, amplitude = np.asarray(table["zeta"]), np.asarray(table["amplitude"])
+    """The first and the last cycle's damping is a decrement continued beyond the cycles: it is no largest one."""
+    zeta, amplitude = np.asarray(table["zeta"])[1:-1], np.asarray(table["amplitude"])
     return {
         "half_time": _half_time(np.asarray(table["time"]), np.log(amplitude)),
-        "largest_zeta": float(zeta[most_damped(zeta)]),
+        "largest_zeta": float(zeta[most_damped(zeta)]) if len(zeta) else math.nan,
         "last_amplitude": float(amplitude[-1]),
     }
 
@@ -132,8 +133,9 @@ def _half_time(time: Array, level: Array) -> float:
 
 def _decay_words(row: Row) -> str:
     half = f"half of it after {row['half_time']:.5g} s" if math.isfinite(row["half_time"]) else "half of it not reached"
-    zeta = 100 * without_rounding(row["largest_zeta"])
-    return f"{half}, largest zeta {zeta:.4g} %, {row['last_amplitude']:.4g} {row['unit']} at the end"
+    zeta = row["largest_zeta"]
+    words = f", largest zeta {100 * without_rounding(zeta):.4g} %" if math.isfinite(zeta) else ""
+    return f"{half}{words}, {row['last_amplitude']:.4g} {row['unit']} at the end"
 
 
 def _linear(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
