@@ -181,6 +181,32 @@ def test_damping_is_that_of_cycles_between_others(tmp_path: Path, capsys) -> Non
     assert "zeta" not in line and line.endswith(" at the end")
 
 
+def test_what_no_draw_has_is_said(tmp_path: Path, capsys) -> None:
+    """Motions that grow settle on no limit cycle, with any draw: nothing was told of them at all."""
+    text = CASE.replace(*MEMORYLESS).replace("friction_limit = 1.0", "friction_limit = 0.05", 1)
+    text = text.replace("K = [[1.0]]\n", "K = [[1.0]]\nC = [[-0.02]]\n")
+    cycle = '[[analysis]]\nname = "ends"\ntype = "limit_cycle"\nmode = "mode"\namplitude = [9.0]\nperiods = 12\n'
+    limits = '{ distribution = "uniform", low = 0.9, high = 1.1 }'
+    drawn = f"[uncertainty]\nfactors.contact.slider.friction_limit = {limits}\n"
+    run = swept(tmp_path, drawn + text + cycle, "uncertainty.seed=1:3", "mode", "ends")
+    said = "ends: no value that came to its end has limit_cycle, limit_cycle_hz"
+    assert said in capsys.readouterr().out
+    assert call("show", run) == 0
+    assert said in capsys.readouterr().out
+
+
+def test_an_analysis_that_finds_nothing_is_named(tmp_path: Path, capsys) -> None:
+    """Fed by 45 % of damping all motions leave before four cycles: the sweep ended without a word of them."""
+    text = CASE.replace(*MEMORYLESS).replace("friction_limit = 1.0", "friction_limit = 0.05", 1)
+    text = text.replace("K = [[1.0]]\n", "K = [[1.0]]\nC = [[-0.9]]\n")
+    decay = '[[analysis]]\nname = "decay"\ntype = "free_decay"\nmode = "mode"\namplitude = [4.0]\nperiods = 20\n'
+    over = '[[analysis]]\nname = "own"\ntype = "sweep"\nof = "decay"\nover.model.C = [[[-0.8]], [[-0.9]]]\n'
+    swept(tmp_path, text + decay + over, "contact.slider.friction_limit=0.05,0.06", "mode", "decay")
+    assert "decay: nothing was found with any of the values" in capsys.readouterr().out
+    call("run", tmp_path / "case.toml", "--only", "own", "--out", tmp_path / "own")
+    assert "own: nothing was found with any of the values" in capsys.readouterr().out
+
+
 def test_limit_cycles_by_start(tmp_path: Path, capsys) -> None:
     """Negative damping against the friction of a weak limit: Coulomb's amplitude 4 F / (pi |c| omega) is unstable.
 

@@ -127,7 +127,7 @@ def _write(
     run_id = folder.record["run_id"]
     outcomes, summary, lines = sweep.outcomes(run_id, errors), [], list[str]()
     for name in first.analyses:
-        branches = sweep.branches(name, run_id)
+        branches, rows = sweep.branches(name, run_id), list[dict[str, Any]]()
         if branches:
             reason = reasons_text(sweep.plan, why_branches_stopped(outcomes, branches))
             attributes = {"run_id": run_id, "status": "stopped" if reason else "done", "reason": reason}
@@ -136,7 +136,7 @@ def _write(
             columns = summary_columns(str(branches[0].attributes["type"]), branches, rows)
             headings = {column.name: column.heading for column in columns}  # their units may differ by analysis
             summary += [{"analysis": name, **{headings.get(key, key): row[key] for key in row}} for row in rows]
-            lines += summary_lines(name, sweep.plan, branches, rows)
+        lines += summary_lines(name, sweep.plan, branches, rows)
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]

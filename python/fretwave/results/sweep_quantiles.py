@@ -103,6 +103,8 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
     if lines:
         lines.append(f"{name}: in brackets the {100 * CONFIDENCE:g} % confidence intervals of the quantiles")
+    none = _had_by_none(plan, rows, columns)
+    lines += [f"{name}: no value that came to its end has {', '.join(none)}"] if none else []
     bad = _left_out(plan, rows, split)
     if bad:
         shown = "; ".join(bad[:10]) + ("; ..." if bad[10:] else "")
@@ -113,6 +115,12 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         for q, n in short.items()
     ]
     return lines
+
+
+def _had_by_none(plan: Plan, rows: Sequence[Row], columns: Sequence[Column]) -> list[str]:
+    """Quantities that no branch that came to its end has, where some did come to theirs."""
+    ended = any(row.get("done", 1) == 1 for row in rows)
+    return [one.name for one in columns if ended and not samples(range(len(plan)), rows, one.name)]
 
 
 def _left_out(plan: Plan, rows: Sequence[Row], split: str) -> list[str]:

@@ -193,6 +193,8 @@ def summary_columns(kind: str, branches: Sequence[Branch], rows: Sequence[Mappin
 
 def summary_lines(name: str, plan: Plan, branches: Sequence[Branch], rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """A sweep in words: a line for each value, of draws the quantiles."""
+    if not branches:
+        return [f"{name}: nothing was found with any of the values"]
     kind = str(branches[0].attributes["type"])
     if not over_seeds(plan):
         return landmarks(name, plan, rows, summary_of(kind), amplitude_unit(branches))

@@ -63,7 +63,7 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
 
     def finish() -> Outcome:
         outcomes, branches = sweep.outcomes(run_id, errors), sweep.branches(of, run_id)
-        bad = why_stopped(outcomes)
+        bad, rows = why_stopped(outcomes), list[dict[str, Any]]()
         reason = reasons_text(sweep.plan, bad) or "all values done"
         if branches:
             attributes = {"run_id": run_id, "status": "stopped" if bad else "done", "reason": reason}
@@ -72,7 +72,7 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
             summary = folder.path / f"{name}_summary.csv"
             rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
         sweep.forget_others()
-        lines = summary_lines(name, sweep.plan, branches, rows) if branches else []
+        lines = summary_lines(name, sweep.plan, branches, rows)
         points = sum(branch.points for branch in branches)
         advice = next((error.fix for error in errors if error is not None and error.fix), "")
         return Outcome(points, reason, not bad, lines, f"{len(sweep.plan)} whole branches", advice)
