@@ -223,3 +223,23 @@ def test_limit_cycles_by_start(tmp_path: Path, capsys) -> None:
     unstable = 4 * np.array([0.05, 0.05, 0.052, 0.052]) / (np.pi * 0.01)
     assert np.array_equal(last > unstable, [False, True, False, True])
     assert "ends: friction_limit = 0.052, start 1: no limit cycle" in capsys.readouterr().out
+
+
+def test_no_quantile_of_what_is_cut_off(tmp_path: Path) -> None:
+    """Draws whose decay does not reach its half have no time of it: the median of the others would be too small."""
+    text = CASE.replace(*MEMORYLESS).replace("friction_limit = 1.0", "friction_limit = 1e-6", 1)
+    text = text.replace("K = [[1.0]]\n", 'K = [[1.0]]\nbuilder = "damped.py"\n')
+    text = text.replace("K = [[1.0]]\n", "").replace("M = [[1.0]]\n", "").replace('dofs = ["x"]\n', "", 1)
+    (tmp_path / "damped.py").write_text(
+        "import fretwave as fw, numpy as np\n"
+        "def build(c=0.02):\n"
+        "    return fw.Structure(M=np.eye(1), K=np.eye(1), C=c * np.eye(1), dofs={'x': 0})\n"
+    )
+    drawn = 'values.model.options.c = { distribution = "uniform", low = 0.005, high = 0.03 }\n'
+    decay = '[[analysis]]\nname = "decay"\ntype = "free_decay"\nmode = "mode"\namplitude = [10.0]\nperiods = 12\n'
+    text = text.replace('builder = "damped.py"\n', 'builder = "damped.py"\noptions = { c = 0.02 }\n')
+    run = swept(tmp_path, f"{text}{decay}[uncertainty]\n{drawn}", "uncertainty.seed=1:6", "mode", "decay")
+    half = column(run / "summary.csv", "half_time", analysis="decay")
+    assert 0 < np.isnan(half).sum() < 6
+    told = {row["quantity"] for row in rows(run / "decay_quantiles.csv")}
+    assert told == {"largest_zeta", "last_amplitude"}

@@ -174,5 +174,7 @@ STATES_AT_REST = Summary(
     STATIC, _static, _static_words, "factor", spread=("slip_share", "open_share", "smallest_normal_force")
 )
 CYCLES_IN_TIME = Summary(LIMIT, _limit_cycle, _limit_cycle_words, "start", spread=("limit_cycle", "limit_cycle_hz"))
-DECAYS = Summary(DECAY, _decay, _decay_words, "start", spread=("half_time", "largest_zeta"))
+DECAYS = Summary(
+    DECAY, _decay, _decay_words, "start", spread=("largest_zeta", "last_amplitude"), cut_off=("half_time",)
+)
 LINEAR_MODES = Summary((), _linear, _linear_words, "nodal_diameter", numbered=LINEAR)

@@ -99,6 +99,9 @@ class Summary:
         Columns whose quantiles are shown where a sweep goes over draws.
     numbered : tuple of Column
         As many as a branch has of each: numbers have names that begin with those of the columns; all of them are shown.
+    cut_off : tuple of str
+        Columns that a value lacks where they would be large: quantiles of the others would be too small, and are not
+        made.
     """
 
     columns: tuple[Column, ...] = ()
@@ -108,6 +111,7 @@ class Summary:
     on_wheel: tuple[Column, ...] = ()
     spread: tuple[str, ...] = ()
     numbered: tuple[Column, ...] = ()
+    cut_off: tuple[str, ...] = ()
 
 
 COUNTS = Summary()

@@ -158,7 +158,8 @@ def write_sweep(
     if summary is not None:
         write_rows(summary, rows, {column.name: column.heading for column in columns})
     if over_seeds(plan):
-        told = [column for column in columns if column.kind == "f" and column.name not in OF_COST]
+        left_out = (*OF_COST, *summary_of(kind).cut_off)
+        told = [column for column in columns if column.kind == "f" and column.name not in left_out]
         write_rows(folder / f"{name}_quantiles.csv", quantile_rows(plan, rows, told, split_of(kind)))
     with rewritten(folder / "results.h5", name) as file:
         file.attrs["title"] = title
