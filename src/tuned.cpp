@@ -27,7 +27,7 @@ Tuned::operator double() const {
   if (!(value > 0 && value < below_))
     throw InputError(
         "option fw_" + name() + ": " + meaning_, short_text(value),
-        std::isinf(below_) ? "a number above zero" : "a number from zero to " + short_text(below_),
+        std::isinf(below_) ? "a number above zero" : "a number above zero and below " + short_text(below_),
         "leave it out");
   return value;
 }

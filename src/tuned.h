@@ -16,7 +16,7 @@ class Tuned {
   Tuned(Tuned const&) = delete;
   /// `InputError` where the option is no number between zero and that bound.
   operator double() const;
-  int count() const;  ///< the whole number in it, of a few hundred million at the most
+  int count() const;  ///< the whole number in it, of a hundred million at the most
   std::string name() const { return name_; }
   double value() const { return value_; }  ///< without the option
   std::string meaning() const { return meaning_; }

@@ -35,7 +35,7 @@ def place(name: str, value: object, count: int) -> int:
     return found
 
 
-def with_a_square(what: str, value: float, fix: str) -> None:
+def with_a_square(what: str, value: float, fix: str, where: str | None = None) -> None:
     """Its square is a number, and not zero unless it is zero itself.
 
     Raises
@@ -45,7 +45,7 @@ def with_a_square(what: str, value: float, fix: str) -> None:
     size = abs(value)
     if size > LARGEST or 0 < size < 1 / LARGEST:
         how, bound = ("large", f"at most {LARGEST:g}") if size > 1 else ("small", f"at least {1 / LARGEST:g}")
-        raise InputError(f"{what} is too {how}", None, f"{value:g}", f"{bound}, whose square is a number", fix)
+        raise InputError(f"{what} is too {how}", where, f"{value:g}", f"{bound}, whose square is a number", fix)
 
 
 def positive(name: str, value: object) -> float:

@@ -75,7 +75,7 @@ def slider(comm) -> fw.NonlinearMode:
 
 @pytest.mark.ranks(1)
 def test_a_share_of_one_and_more_is_refused(comm):
-    with options(fw_error_tolerance=2), pytest.raises(fw.InputError, match="a number from zero to 1"):
+    with options(fw_error_tolerance=2), pytest.raises(fw.InputError, match="above zero and below 1"):
         fw.follow(slider(comm), 2.0, 2.5)
 
 

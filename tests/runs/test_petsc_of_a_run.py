@@ -58,12 +58,10 @@ def test_of_one_analysis_it_steers_that_alone(run) -> None:
     assert "SNES Function norm" in second and "SNES Function norm" not in first
 
 
-@pytest.mark.parametrize(
-    "petsc", ["-snes_rtoll 1e-9", "-routee direct", "-fw_linear_renewl 1", "-free_decay_nonsense 1"]
-)
+@pytest.mark.parametrize("petsc", ["-snes_rtoll 1e-9", "-routee direct", "-fw_linear_renewl 1", "-mode_snes_rtoll 1"])
 def test_a_misspelt_one_is_refused_before_the_first_point(run, petsc: str, tmp_path: Path) -> None:
     code, said = run("mode", petsc)
-    assert code == 2 and petsc.split()[0] in said and not (tmp_path / "out").exists()
+    assert code == 2 and petsc.split()[0].removeprefix("-mode_") in said and not (tmp_path / "out").exists()
 
 
 def test_what_nothing_has_read_is_told_at_the_end(run) -> None:
@@ -92,6 +90,30 @@ def test_those_of_the_environment_are_held_to_the_same_rules(run, name: str, val
     with options(**{name: value}):
         code, said = run("mode")
     assert code == 2 and expected in said and "PETSc error" not in said
+
+
+def test_one_of_an_analysis_that_does_not_run_is_told(run) -> None:
+    """And goes to no other whose name it begins with."""
+    code, said = run("mode", "-mode_epmc_snes_max_it 24")
+    assert code == 0 and f"{UNREAD}: -mode_epmc_snes_max_it" in said
+    with options(mode_epmc_snes_max_it=24):
+        assert run("mode")[0] == 0
+
+
+def test_one_of_another_analysis_leaves_a_sweep_alone(tmp_path: Path, capfd) -> None:
+    text = as_toml(bases.two_dof())
+    sweep = '[[analysis]]\nname = "losses"\ntype = "sweep"\nof = "mode_epmc"\nover = { mode_epmc.harmonics = [1, 3] }\n'
+    (tmp_path / "case.toml").write_text(text + sweep, encoding="utf-8")
+    words = ["--only", "mode,losses", "--petsc=-mode_snes_max_it 24", "--no-plots", "--out", tmp_path / "out"]
+    assert call("run", tmp_path / "case.toml", *words) == 0
+    assert UNREAD not in "".join(capfd.readouterr())
+
+
+@pytest.mark.parametrize("name", ["info", "history", "version", "malloc", "log_all"])
+def test_an_analysis_may_have_the_name_of_what_petsc_reads_as_it_starts(name: str) -> None:
+    assert parse(f"-{name}_snes_rtol 1e-9") == [(f"{name}_snes_rtol", "1e-9")]
+    with pytest.raises(InputError, match="as it starts"):
+        parse(f"-{name} 1")
 
 
 def test_one_of_the_environment_without_effect_is_told(run) -> None:

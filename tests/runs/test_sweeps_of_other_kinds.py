@@ -87,7 +87,10 @@ def test_linear_frequencies_in_closed_form(tmp_path: Path, capsys) -> None:
     stiffness = np.array([0.5, 1.0, 3.0])
     assert column(run / "summary.csv", "hz_stuck_1") == pytest.approx(np.sqrt(1 + stiffness) / (2 * np.pi), rel=SOLVED)
     assert column(run / "summary.csv", "hz_free_1") == pytest.approx(1 / (2 * np.pi), rel=SOLVED)
-    assert "linear: tangential_stiffness = 3.0: 2 modes, 0.159155 to 0.31831 Hz" in capsys.readouterr().out
+    assert (
+        "linear: tangential_stiffness = 3.0: stuck 1 mode 0.31831 Hz, free 1 mode 0.159155 Hz"
+        in capsys.readouterr().out
+    )
     with rewritten(run / "results.h5", "none") as file:  # as an earlier version wrote it
         for name in ("hz_stuck_1", "hz_free_1"):
             del file[f"linear/summary/{name}"]
@@ -101,8 +104,8 @@ def test_values_with_fewer_modes_than_others_are_shown_as_they_were_told(tmp_pat
     run = swept(tmp_path, CASE + linear, 'linear.contact=["stuck"],["stuck","free"]', "linear")
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("linear: contact")]
     assert [line.rpartition(": ")[2] for line in told] == [
-        "1 mode, 0.225079 to 0.225079 Hz",
-        "2 modes, 0.159155 to 0.225079 Hz",
+        "stuck 1 mode 0.225079 Hz",
+        "stuck 1 mode 0.225079 Hz, free 1 mode 0.159155 Hz",
     ]
     assert call("show", run) == 0
     assert [line for line in capsys.readouterr().out.splitlines() if line in told] == told
@@ -243,3 +246,6 @@ def test_no_quantile_of_what_is_cut_off(tmp_path: Path) -> None:
     assert 0 < np.isnan(half).sum() < 6
     told = {row["quantity"] for row in rows(run / "decay_quantiles.csv")}
     assert told == {"largest_zeta", "last_amplitude"}
+    words = ["--over", "uncertainty.seed=1:6", "--only", "mode,decay", "--set", "decay.periods=60"]
+    assert call("sweep", tmp_path / "case.toml", *words, "--out", tmp_path / "long") == 0
+    assert {"half_time"} < {row["quantity"] for row in rows(tmp_path / "long" / "decay_quantiles.csv")}

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..files.csv_table import write_columns
-from ..importers.contact_results import Nodal, at_rest, read_step, surfaces
+from ..importers.contact_results import Nodal, StaticStep, at_rest, read_step, surfaces
 from ..importers.formats import readable
 from ..importers.nodes import Nodes
 from ..importers.pairs import GROUND
@@ -22,6 +22,7 @@ from ..model.law_info import Role
 from ..model.laws import usual_name
 from ..model.structure import Structure
 
+NO_NODES = np.zeros(0, dtype=np.int64)
 #: A file and its columns.
 Table = tuple[Path, Mapping[str, Union[Array, IntArray]]]
 
@@ -44,7 +45,9 @@ def tables_at_rest(options: argparse.Namespace, model: Structure, nodes: Nodes |
     given = [[words[0].rpartition("=")[2], *words[1:]] for words in options.pairs]
     tables: list[Table] = []
     for (name, pairs), sides in zip(model.pairs.items(), given):
-        springs = [] if nodes is None or len(sides) == 1 else [_springs(nodes, side) for side in sides]
+        springs: list[Nodal] = []
+        if nodes is not None:
+            springs = 2 * [_dependent(nodes, step)] if len(sides) == 1 else [_springs(nodes, side) for side in sides]
         found = at_rest(name, pairs, step, model.labels, sides, len(model.pairs) == 1, springs)
         notes.append(found.said(name, pairs))
         tables.append((options.out.with_name(f"{options.out.stem}_{name}.csv"), found.columns(pairs)))
@@ -55,10 +58,18 @@ def _springs(nodes: Nodes, name: str) -> Nodal:
     """Areas of the nodes of a side of the contact, of none where no faces are known."""
     (name,) = surfaces([name])
     if name == GROUND and name not in nodes.sets:
-        return Nodal(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
+        return Nodal(NO_NODES, np.zeros((0, 1)))
     side = side_of(nodes, name)
     order = np.argsort(side.numbers) if side.faces else np.zeros(0, dtype=np.intp)
     return Nodal(side.numbers[order], spring_areas(side)[order, None])
+
+
+def _dependent(nodes: Nodes, step: StaticStep) -> Nodal:
+    """The same of all dependent surfaces that the step's deck names: a table of pairs says nothing of them."""
+    names = dict.fromkeys(name for name, _ in step.stand_off if name in nodes.elements.surfaces)
+    found = [_springs(nodes, name) for name in names]
+    numbers, first = np.unique(np.concatenate([NO_NODES, *(one.numbers for one in found)]), return_index=True)
+    return Nodal(numbers, np.concatenate([np.zeros((0, 1)), *(one.values for one in found)])[first])
 
 
 def write_tables(tables: Sequence[Table], model: Structure) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
 from typing import Any
 
@@ -58,7 +57,9 @@ class ForcedResponse(HarmonicProblem):
         self.dof, self.level, self.reference = dof, level, reference
         P = self._blocks(model, harmonics, force)
         largest = max((float(abs(np.asarray(one)).max()) for one in force.values()), default=0.0)
-        with_a_square("the excitation", float(numbers("level", level)) * largest, "choose another level or other units")
+        with_a_square(
+            "the excitation", float(numbers("level", level)) * largest, "choose another level or other units", "level"
+        )
         with model.vectors(reference.shape) as (shape,):
             row = row_of(model, dof)
             core = _core.ForcedResponse(model.core, harmonics.core, row, P, level, reference.omega, shape)
@@ -72,7 +73,7 @@ class ForcedResponse(HarmonicProblem):
             measured, fix = shortened(repr(force)), "write {1: P}, P one number a dof"
             raise InputError("the force has no harmonics", "force", measured, "a dict by whole orders", fix)
         blocks = np.zeros((model.n_dof, harmonics.block_size))
-        for order, P in ((operator.index(given), P) for given, P in force.items()):
+        for order, P in ((whole(given), P) for given, P in force.items()):
             if order not in harmonics.orders:
                 raise InputError(
                     "the force has a harmonic that is not retained",

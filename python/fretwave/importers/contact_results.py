@@ -295,7 +295,7 @@ def _check_side(
         fix = "give *SURFACE, TYPE=ELEMENT with the faces to the dependent side, and run ccx again"
         what, expected = "the dependent side is a surface of nodes", "faces, whose areas make forces of pressures"
         raise InputError(what, where, "*SURFACE, TYPE=NODE in the step's deck", expected, fix)
-    if told == 0 or step.force(sides, alone) is not None or len(springs) < 2:
+    if told == 0 or step.force(sides, alone) is not None or len(springs) < 2 or len(sides) < 2:
         return
     partners, known = np.asarray(pairs.nodes)[:, 1], springs[1].numbers
     if len(known) and sorted(partners.tolist()) != known.tolist():

@@ -117,7 +117,7 @@ class AnalysisOptions:
 
     def _take_up(self, before: Mapping[str, str | None]) -> None:
         """Options of the environment that are this analysis' or shared: held to the same rules as its own."""
-        prefixes = (self.prefix, *self.wide.kinds)
+        prefixes = (self.prefix, *self.wide.known)
         mine = {n: v for n, v in before.items() if owner(n, prefixes) == self.prefix or SHARED.match(n)}
         for name, value in mine.items():
             if name not in self.pairs:
@@ -196,15 +196,15 @@ def said_unread(names: Sequence[str], of: str = "") -> str:
     return f"PETSc options{of} that no solver has read: {', '.join(f'-{name}' for name in names)}" if names else ""
 
 
-def unread_outside(unused: Sequence[str], kinds: Mapping[str, str]) -> str:
+def unread_outside(unused: Sequence[str], wide: RunWide) -> str:
     """Says at the end of a run which options of the environment nothing has read; empty where all were."""
     tuned = _tuned()
     names = [
         name
         for name in names_of(unused)
-        if name not in WHOLE and name not in tuned and not AT_START.match(name) and not owner(name, tuple(kinds))
+        if name not in WHOLE and name not in tuned and not AT_START.match(name) and not owner(name, wide.known)
     ]
-    example = next(iter(kinds), "")
+    example = "" if names and SHARED.match(names[0]) else next(iter(wide.kinds), "")
     own = f" (an analysis' own begin with its name: -{example}{names[0]})" if names and example else ""
     return said_unread(names, f" of {ENVIRONMENT},") + own if names else ""
 

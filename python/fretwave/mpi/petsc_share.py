@@ -16,19 +16,20 @@ SHARED = re.compile(r"fw_|static_|stuck_|component_|modes_(eps|pep|st|bv|count)_
 TUNED = "fw_"
 #: Of them what a reduction reads, before all analyses.
 REDUCTION = "component_"
-#: Whose steps in time a response is checked by, or what follows a motion in time.
-TIME_KIND = "time"
+#: What follows a motion in time, and the steps in time that a response is checked by.
+TIME_KIND, IN_TIME = "time", "time_"
 HARMONIC_KIND = "harmonics"
 #: What options of such an analysis begin with, by its kind.
 READ_BY = {
     HARMONIC_KIND: re.compile(r"(route|blocks)$|(snes|ksp|pc|mat|tangent|whole|npc)_"),
-    TIME_KIND: re.compile(r"(ts|mass|time)_"),
+    TIME_KIND: re.compile(r"(ts|mass)_"),
 }
 #: What PETSc reads as it starts, before a case is known.
 AT_START = re.compile(
     r"(malloc|info|fp_trap|options_(left|view|monitor|file|string_file)|on_error|start_in_debugger|debugger|stop_for|no_signal"
     r"|mpi_return|error_output|memory_view|log_(all|trace|exclude|sync|mpe|summary|perfstubs)|get_total|check_pointer"
-    r"|skip_petscrc|saws|history|version|shared_tmp|not_shared_tmp|use_gpu|device_enable|petsc_ci)(_|$)"
+    r"|skip_petscrc|saws|history|version|shared_tmp|not_shared_tmp|use_gpu|device_enable|petsc_ci|citations|mpidump"
+    r"|objects_dump)(?!_(snes|ksp|pc|ts|mat|route|blocks|tangent|whole|npc|mass|time)(_|$))(_|$)"  # an analysis' name
 )
 
 
@@ -59,16 +60,24 @@ class RunWide:
         As they were given.
     kinds : dict
         Kind of each analysis that runs by its prefix, in their order.
+    others : sequence of str
+        Prefixes of the case's analyses that do not run: what is theirs is nobody else's.
     """
 
     pairs: Sequence[tuple[str, str | None]] = ()
     kinds: Mapping[str, str] = field(default_factory=dict)
+    others: Sequence[str] = ()
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Prefixes of all analyses of the case."""
+        return (*self.kinds, *self.others)
 
     def of(self, prefix: str, whole: Sequence[str] = ()) -> Iterator[tuple[str, str | None]]:
         """Full names and values for one analysis; what is given to it alone comes last, and wins."""
         last = []
         for name, value in self.pairs:
-            mine = owner(name, (prefix, *self.kinds))
+            mine = owner(name, (prefix, *self.known))
             if mine == prefix:
                 last.append((name, value))
             elif name in whole or SHARED.match(name):
@@ -82,8 +91,8 @@ class RunWide:
         return [(name, value) for name, value in self.pairs if name.startswith(REDUCTION)]
 
     def of_all(self) -> list[str]:
-        """Names that are not of one analysis alone."""
-        return [name for name, _ in self.pairs if SHARED.match(name) or not owner(name, tuple(self.kinds))]
+        """Names that are not of one analysis alone that runs: these tell their own."""
+        return [name for name, _ in self.pairs if SHARED.match(name) or owner(name, self.known) not in self.kinds]
 
     def left_to_others(self, prefix: str, name: str) -> bool:
         """An option without any prefix, full name here, is for other analyses: nothing here has to read it."""
@@ -92,6 +101,8 @@ class RunWide:
             return not name.startswith(TUNED)
         if plain not in dict(self.pairs):
             return False
+        if plain.startswith(IN_TIME):
+            return True
         first = next((other for other, its in self.kinds.items() if its == kind), prefix)
         others = {its for other, its in self.kinds.items() if other != prefix and its != kind}
         return first != prefix or any(its in others and rule.match(plain) for its, rule in READ_BY.items())

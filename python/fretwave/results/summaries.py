@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array
 from ..columns import Column
+from ..model.contact import LIMITS
 from ..post.decays import LIMIT_CYCLE
 from ..post.mode_curve import most_damped, without_rounding
 from ..texts import counted
@@ -160,8 +161,13 @@ def _linear_words(row: Row) -> str:
     factors, hz = (_known(row, column.name) for column in LINEAR)
     if not hz:
         raise KeyError(LINEAR[1].name)
-    words = f"{counted(len(hz), 'mode')}, {min(hz):.6g} to {max(hz):.6g} Hz"
+    words = ", ".join(f"{limit} {_modes(own)}" for limit in LIMITS if (own := _known(row, f"hz_{limit}_")))
     return words + (f"; largest amplification {max(factors):.4f}" if factors else "")
+
+
+def _modes(hz: Sequence[float]) -> str:
+    low, high = f"{min(hz):.6g}", f"{max(hz):.6g}"
+    return f"{counted(len(hz), 'mode')} {low if low == high else f'{low} to {high}'} Hz"
 
 
 def _known(row: Row, begin: str) -> list[float]:

@@ -100,8 +100,8 @@ class Summary:
     numbered : tuple of Column
         As many as a branch has of each: numbers have names that begin with those of the columns; all of them are shown.
     cut_off : tuple of str
-        Columns that a value lacks where they would be large: quantiles of the others would be too small, and are not
-        made.
+        Columns that a value lacks where they would be large: quantiles of the others would be too small, and are made
+        where all have them alone.
     """
 
     columns: tuple[Column, ...] = ()

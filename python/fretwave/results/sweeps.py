@@ -158,7 +158,7 @@ def write_sweep(
     if summary is not None:
         write_rows(summary, rows, {column.name: column.heading for column in columns})
     if over_seeds(plan):
-        left_out = (*OF_COST, *summary_of(kind).cut_off)
+        left_out = (*OF_COST, *_lacking(summary_of(kind).cut_off, rows))
         told = [column for column in columns if column.kind == "f" and column.name not in left_out]
         write_rows(folder / f"{name}_quantiles.csv", quantile_rows(plan, rows, told, split_of(kind)))
     with rewritten(folder / "results.h5", name) as file:
@@ -173,6 +173,12 @@ def write_sweep(
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
+
+
+def _lacking(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Columns that not all branches have that came to their end."""
+    ended = [row for row in rows if row.get("done", 1) == 1]
+    return [name for name in names if not all(np.isfinite(row.get(name, np.nan)) for row in ended)]
 
 
 def amplitude_unit(branches: Sequence[Branch]) -> str:

@@ -132,7 +132,9 @@ class Runner:
         sweeps = check_sweeps(self.case, names, self.options, self.comm)
         self.folder.record["selected"] = names
         self.wide = RunWide(
-            parse(self.options.petsc), {prefix_of(name): kind_of(self.case.analyses[name]) for name in names}
+            parse(self.options.petsc),
+            {prefix_of(name): kind_of(self.case.analyses[name]) for name in names},
+            [prefix_of(name) for name in self.case.analyses if name not in names],
         )
         self._greet(names)
         self._reduce([name for name in names if name not in sweeps])
@@ -142,7 +144,7 @@ class Runner:
             if self.case.basis is not None:
                 self.case.basis.destroy()
         self._say_left_out(names)
-        self._say_unread()
+        self._say_unread(bool(sweeps))
         self._finish()
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
@@ -354,14 +356,14 @@ class Runner:
         for line in told:
             self.console.line(line)
 
-    def _say_unread(self) -> None:
+    def _say_unread(self, sweeps: bool) -> None:
         """Options without effect: those of the whole run that no analysis has read, those of the environment."""
         from .. import _core
 
-        idle = [] if self.resuming else [name for name in self.wide.of_all() if name not in self.read]
-        if idle:
+        idle = [name for name in self.wide.of_all() if name not in self.read]
+        if idle and not self.resuming and not self.part and not sweeps:  # a sweep's values read them in their own runs
             self.console.line(f"note: {said_unread(idle)}")
-        unread = unread_outside(_core.unused_options(), self.wide.kinds)
+        unread = unread_outside(_core.unused_options(), self.wide)
         if unread:
             self.console.line(f"note: {unread}")
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ..analyses.parts.context import Outcome
 from ..errors import NotConverged
 from ..hb.suspects import FREE, LEADS_OVER
+from ..mpi.petsc_share import prefix_of
 
 #: A loop may end within itself, and an internal resonance lead to another mode.
 OVER = "steps that pass over loops (--petsc '-fw_branch_other 1e300')"
@@ -40,9 +41,7 @@ def advice(name: str, reason: str) -> str:
     if FREE in reason:
         return "hold the structure where contact alone cannot (a spring, an axial stop), or load its contact more"
     if "linear solve" in reason or "LINEAR_SOLVE" in reason:
-        return (
-            f"another start, or shorter steps; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
-        )
+        return f"another start, or shorter steps; --petsc '-ksp_monitor -{prefix_of(name)}snes_monitor' shows why"
     if "overdamped" in reason:
         return (
             f"amplitudes at which the mode is damped less (--set {name}.amplitude=...): regularised friction is viscous"
