@@ -109,6 +109,21 @@ def test_one_of_another_analysis_leaves_a_sweep_alone(tmp_path: Path, capfd) -> 
     assert UNREAD not in "".join(capfd.readouterr())
 
 
+def test_shared_ones_of_an_analysis_alone_are_told(run) -> None:
+    code, said = run("mode", "", "--set", 'mode.petsc="-static_snes_rtoll 1e-9"')
+    assert code == 0 and f"{UNREAD}: -static_snes_rtoll" in said
+
+
+@pytest.mark.parametrize(("petsc", "ends"), [("-snes_max_it 24", 0), ("-snes_rtoll 1e-9", 2)])
+def test_an_analysis_may_be_named_like_a_shared_one(petsc: str, ends: int, tmp_path: Path, capfd) -> None:
+    case = bases.two_dof()
+    case["analysis"] = [{**case["analysis"][0], "name": "static"}]
+    (tmp_path / "case.toml").write_text(as_toml(case), encoding="utf-8")
+    words = ["--only", "static", f"--petsc={petsc}", "--no-plots", "--out", tmp_path / "out"]
+    assert call("run", tmp_path / "case.toml", *words) == ends
+    assert UNREAD not in "".join(capfd.readouterr())
+
+
 @pytest.mark.parametrize("name", ["info", "history", "version", "malloc", "log_all"])
 def test_an_analysis_may_have_the_name_of_what_petsc_reads_as_it_starts(name: str) -> None:
     assert parse(f"-{name}_snes_rtol 1e-9") == [(f"{name}_snes_rtol", "1e-9")]

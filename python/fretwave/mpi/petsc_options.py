@@ -173,15 +173,16 @@ class AnalysisOptions:
 
     def unread(self, unused: Callable[[], Sequence[str]]) -> str:
         """Says at the end which options no solver has read; empty where all were, or may be by other analyses."""
-        left = [name for name in self._unread(unused) if not self.wide.left_to_others(self.prefix, name)]
+        own = {name for name in self.pairs if SHARED.match(name)} - {name for name, _ in self.wide.pairs}
+        left = [name for name in self._unread(unused) if name in own or not self.wide.left_to_others(self.prefix, name)]
         return said_unread([self._plain(name) for name in left])
 
     def read(self, unused: Callable[[], Sequence[str]]) -> set[str]:
         """Names, as they were given, of what solvers have read here."""
-        return {self._plain(name) for name in {*self.given} - {*self._unread(unused)}}
+        return {one for name in {*self.given} - {*self._unread(unused)} for one in (name, self._plain(name))}
 
     def _plain(self, name: str) -> str:
-        return name if SHARED.match(name) else name.removeprefix(self.prefix)
+        return name.removeprefix(self.prefix)  # of an analysis that is named like a shared one, too
 
     def _unread(self, unused: Callable[[], Sequence[str]]) -> list[str]:
         """Names of options that nothing has read; tuned constants are read where they come in, or never."""

@@ -97,7 +97,7 @@ class RunWide:
     def left_to_others(self, prefix: str, name: str) -> bool:
         """An option without any prefix, full name here, is for other analyses: nothing here has to read it."""
         plain, kind = name.removeprefix(prefix), self.kinds.get(prefix, "")
-        if SHARED.match(name):
+        if SHARED.match(name) and not name.startswith(prefix):
             return not name.startswith(TUNED)
         if plain not in dict(self.pairs):
             return False
