@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -239,6 +239,17 @@ class TwoDof:
 def comm() -> MPI.Comm:
     """World communicator."""
     return WORLD
+
+
+@pytest.fixture(autouse=True)
+def petsc_options_of_one_test() -> Iterator[None]:
+    """What a test puts into PETSc's database goes with it: a run tells what of it nothing reads."""
+    from petsc4py import PETSc
+
+    before = set(PETSc.Options().getAll())
+    yield
+    for name in set(PETSc.Options().getAll()) - before:
+        PETSc.Options().delValue(name)
 
 
 @pytest.fixture
