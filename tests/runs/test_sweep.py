@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import signal
 import subprocess
@@ -14,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import own_environment
+from models.csv_columns import column, rows
 from models.swept_case import CASE, LIMITS, MEMORYLESS, OVER, fretwave
 from tolerances import SOLVED
 
@@ -42,15 +42,6 @@ def swept(case: Path, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("swept")
     assert fretwave("sweep", case, *OVER, "--only", "mode", "--out", folder) == 0
     return folder
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def column(path: Path, key: str) -> np.ndarray:
-    return np.array([float(row[key]) for row in rows(path)])
 
 
 def closed_form(a: np.ndarray, limit: float) -> np.ndarray:

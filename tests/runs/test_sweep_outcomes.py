@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import call
+from models.csv_columns import rows
 from models.swept_case import CASE
 from test_engine_order import TEXT
 from tolerances import SOLVED
@@ -29,11 +29,6 @@ LIMITS = "contact.slider.friction_limit="
 MODAL = CASE[CASE.index("[[analysis]]") : CASE.index('[[analysis]]\nname = "limits"')]
 MODAL = MODAL.replace('"mode"', '"modal"', 1).replace('normalise = "x"', "normalise = { mode = 1 }")
 HEAVY = CASE.replace("[[1.0]]", "[[4.0]]", 1)
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 @pytest.fixture

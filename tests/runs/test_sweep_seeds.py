@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from itertools import product
 from pathlib import Path
@@ -11,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from command_line import call
+from models.csv_columns import column, rows
 from models.swept_case import CASE
 from scipy.stats import kstest, lognorm
 from test_engine_order import SECTORS, TEXT
@@ -32,15 +32,6 @@ UNCERTAIN = f"""
 [uncertainty]
 values.{DRAWN} = {{ distribution = "lognormal", mean = {MEAN}, standard_deviation = {DEVIATION} }}
 """
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def column(path: Path, key: str) -> np.ndarray:
-    return np.array([float(row[key]) for row in rows(path)])
 
 
 def stuck_law(q: float) -> float:

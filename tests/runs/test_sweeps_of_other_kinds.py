@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import call
+from models.csv_columns import column, rows
 from models.linear_cases import POINT, ring
 from models.swept_case import CASE, MEMORYLESS
 from models.wear_case import write_case
@@ -42,15 +42,6 @@ name = "rest"
 type = "static"
 factors = [0.5, 1.0, 1.5]
 """
-
-
-def rows(path: Path, **chosen: str) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return [row for row in csv.DictReader(file) if all(row[key] == value for key, value in chosen.items())]
-
-
-def column(path: Path, key: str, **chosen: str) -> np.ndarray:
-    return np.array([float(row[key]) for row in rows(path, **chosen)])
 
 
 def swept(folder: Path, text: str, over: str, *only: str, exit_code: int = 0) -> Path:

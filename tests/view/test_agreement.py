@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import shutil
 import subprocess
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from command_line import call
 from models import two_materials
+from models.csv_columns import rows
 from models.solid_meshes import deck, mesh
 
 pytestmark = pytest.mark.ranks(1)
@@ -57,11 +57,6 @@ def run_of(folder: Path, builder: str, options: str, band: tuple[float, float], 
     (folder / "case.toml").write_text(text)
     assert call("run", folder / "case.toml", "--no-plots", "-q", "--out", folder / "run") == 0
     return call("stress", folder / "run")
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def said(capfd: pytest.CaptureFixture[str]) -> tuple[float, str]:
