@@ -73,7 +73,8 @@ class ForcedResponse(HarmonicProblem):
             measured, fix = shortened(repr(force)), "write {1: P}, P one number a dof"
             raise InputError("the force has no harmonics", "force", measured, "a dict by whole orders", fix)
         blocks = np.zeros((model.n_dof, harmonics.block_size))
-        for order, P in ((whole(given), P) for given, P in force.items()):
+        for given, P in force.items():
+            order = whole(given)
             if order not in harmonics.orders:
                 raise InputError(
                     "the force has a harmonic that is not retained",

@@ -30,8 +30,7 @@ from ..model.pairs import Pairs
 from ..model.sectors import by_sector
 from ..texts import counted, display, shortened
 from .calculix import beside
-from .keywords import blocks
-from .stand_off import Sides, StandOff, of_sides, read_stand_off
+from .stand_off import Sides, StandOff, between, of_sides, read_stand_off
 
 #: Components of the two blocks, 12 characters each behind the node's number.
 BLOCKS, WIDTH = {"CONTACT": 6, "DISP": 3}, 12
@@ -83,10 +82,7 @@ class StaticStep:
 
     def force(self, sides: Sequence[str], alone: bool) -> float | None:
         """Of the contact between two sides, or where there is but one in model and file (`alone`) of that."""
-        names = surfaces(sides)
-        found = next((force for known, force in self.forces.items() if set(known) == set(names)), None)
-        only = next(iter(self.forces.values())) if alone and len(self.forces) == 1 else None
-        return only if found is None else found
+        return between(self.forces, surfaces(sides), alone)
 
     def begins_at(self, pairs: Pairs, sides: Sequence[str]) -> Array:
         """How far the sides of each pair are apart as the step begins (n_pairs,) [length], below zero they overlap."""
@@ -122,16 +118,14 @@ def read_step(path: Path) -> StaticStep:
         expected = "a block CONTACT of a .frd file written as text, or slave nodes in a .dat file"
         raise InputError("there is no contact in the results", display(path), "none", expected, fix)
     forces = {(one[1].upper(), one[2].upper()): -float(one[4]) for one in _STATISTICS.finditer(text)}
-    at_nodes = path == printed or (not forces and _at_nodes(path, found["CONTACT"].values))
     stand_off = read_stand_off(beside(path, ".inp"))
+    at_nodes = path == printed or (not forces and _at_nodes(stand_off, found["CONTACT"].values))
     return StaticStep(found["CONTACT"], found.get("DISP"), forces, display(path), at_nodes, stand_off)
 
 
-def _at_nodes(path: Path, contact: Array) -> bool:
+def _at_nodes(deck: Mapping[Sides, StandOff], contact: Array) -> bool:
     """By the deck beside where all of its contact is of one kind, else by a node that is listed as open."""
-    deck = beside(path, ".inp")
-    pairs = [options for keyword, options, _ in blocks(deck) if keyword == "CONTACT PAIR"] if deck.is_file() else []
-    kinds = {options.get("TYPE", "").upper().startswith("NODE") for options in pairs}
+    kinds = {pair.at_nodes for pair in deck.values()}
     listed = bool(((contact[:, OPENING] > 0) & (contact[:, PRESSURE] <= 0)).any())
     return kinds.pop() if len(kinds) == 1 else listed
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Optional
+from typing import Optional, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from .keywords import Lines, blocks
 
 #: Names of a contact's dependent and independent surface, capital letters.
 Sides = tuple[str, str]
+Known = TypeVar("Known")
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,13 @@ class StandOff:
     adjusted : what is as far apart begins at zero [length]; of a node set inf
     value : in place of the mesh's distance [length]
     of_nodes : the dependent surface is one of nodes (``*SURFACE, TYPE=NODE``)
+    at_nodes : the contact is from node to surface
     """
 
     adjusted: float = -np.inf
     value: Optional[float] = None
     of_nodes: bool = False
+    at_nodes: bool = False
 
     def of(self, clearance: Array) -> Array:
         """The distances (n,) with which the step begins, from those of the mesh [length]."""
@@ -47,24 +50,35 @@ class StandOff:
 
 def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
     """Of every contact pair in a deck; empty without one."""
-    adjusted: dict[Sides, float] = {}
+    pairs: dict[Sides, Mapping[str, str]] = {}
     values: dict[Sides, float] = {}
     nodal = set[str]()
     for keyword, options, data in blocks(deck) if deck.is_file() else ():
         if keyword == "CONTACT PAIR":
-            adjusted.update(dict.fromkeys(_sides(data), _adjusted(options.get("ADJUST", ""))))
+            pairs.update(dict.fromkeys(_sides(data), options))
         elif keyword == "CLEARANCE":
             with suppress(ValueError):  # ccx would not have run with it
                 values[options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()] = float(options["VALUE"])
         elif keyword == "SURFACE" and options.get("TYPE", "").upper() == "NODE":
             nodal.add(options.get("NAME", "").upper())
-    return {sides: StandOff(size, values.get(sides), sides[0] in nodal) for sides, size in adjusted.items()}
+    return {sides: _stand_off(options, values.get(sides), sides[0] in nodal) for sides, options in pairs.items()}
+
+
+def _stand_off(options: Mapping[str, str], value: Optional[float], of_nodes: bool) -> StandOff:
+    at_nodes = options.get("TYPE", "").upper().startswith("NODE")
+    return StandOff(_adjusted(options.get("ADJUST", "")), value, of_nodes, at_nodes)
 
 
 def of_sides(known: Mapping[Sides, StandOff], sides: Sequence[str]) -> StandOff:
     """Of the contact between two sides, or where the deck has but one of that; else as the mesh has it."""
+    found = between(known, sides, True)
+    return StandOff() if found is None else found
+
+
+def between(known: Mapping[Sides, Known], sides: Sequence[str], alone: bool) -> Optional[Known]:
+    """What is known of the contact between two sides, or, if they are `alone`, of the only one."""
     found = next((one for pair, one in known.items() if set(pair) == set(sides)), None)
-    only = next(iter(known.values())) if len(known) == 1 else StandOff()
+    only = next(iter(known.values())) if alone and len(known) == 1 else None
     return only if found is None else found
 
 

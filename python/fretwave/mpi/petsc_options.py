@@ -16,17 +16,8 @@ from .petsc_values import ENVIRONMENT, check_value, parse
 COMMON = (
     *("snes_rtol", "snes_atol", "snes_stol", "snes_max_it", "snes_monitor", "snes_converged_reason"),
     *("snes_linesearch_type", "snes_type", "ksp_type", "ksp_rtol", "ksp_max_it", "ksp_monitor"),
-    *(
-        "route",
-        "blocks",
-        "pc_type",
-        "pc_factor_mat_solver_type",
-        "mat_mumps_icntl_14",
-        "ts_type",
-        "ts_rtol",
-        "ts_atol",
-        "ts_monitor",
-    ),
+    *("route", "blocks", "pc_type", "pc_factor_mat_solver_type", "mat_mumps_icntl_14"),
+    *("ts_type", "ts_rtol", "ts_atol", "ts_monitor"),
 )
 
 
@@ -36,8 +27,6 @@ LOGS = ("log_view", "log_view_memory")
 NESTED = ("ascii_xml", "ascii_flamegraph")
 #: With that by which every solver lists its options as it is made, ours among them.
 WHOLE = (*LOGS, "help")
-#: What options of the time integration that checks a response begin with, behind its analysis' own prefix.
-TIME = "time_"
 
 #: What a complaint of PETSc says of the value it wants.
 WANTED = (

@@ -16,8 +16,10 @@ SHARED = re.compile(r"fw_|static_|stuck_|component_|modes_(eps|pep|st|bv|count)_
 TUNED = "fw_"
 #: Of them what a reduction reads, before all analyses.
 REDUCTION = "component_"
-#: What follows a motion in time, and the steps in time that a response is checked by.
-TIME_KIND, IN_TIME = "time", "time_"
+#: What follows a motion in time.
+TIME_KIND = "time"
+#: What options of the time integration that checks a response begin with, behind its analysis' own prefix.
+TIME = "time_"
 HARMONIC_KIND = "harmonics"
 #: What options of such an analysis begin with, by its kind.
 READ_BY = {
@@ -101,7 +103,7 @@ class RunWide:
             return not name.startswith(TUNED)
         if plain not in dict(self.pairs):
             return False
-        if plain.startswith(IN_TIME):
+        if plain.startswith(TIME):
             return True
         first = next((other for other, its in self.kinds.items() if its == kind), prefix)
         others = {its for other, its in self.kinds.items() if other != prefix and its != kind}

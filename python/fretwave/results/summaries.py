@@ -15,7 +15,7 @@ from ..model.contact import LIMITS
 from ..post.decays import LIMIT_CYCLE
 from ..post.mode_curve import most_damped, without_rounding
 from ..texts import counted
-from .sweep_summary import Row, Summary, Table
+from .sweep_summary import Row, Summary, Table, text_of
 
 #: Attribute of a linear analysis with engine order: its table of amplifications, as JSON.
 AMPLIFIED = "amplifications"
@@ -143,7 +143,7 @@ def _linear(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     """Frequencies by contact and number, of several speeds at the highest, and how far mistuning amplifies."""
     speed = np.asarray(table.get("speed_rpm", np.zeros(len(table["mode"]))))
     rows = np.flatnonzero(speed == speed.max())
-    hz = {f"hz_{_text(table['contact'][k])}_{table['mode'][k]}": float(table["frequency_hz"][k]) for k in rows}
+    hz = {f"hz_{text_of(table['contact'][k])}_{table['mode'][k]}": float(table["frequency_hz"][k]) for k in rows}
     return {**hz, **dict(_amplified(attributes))}
 
 
@@ -151,10 +151,6 @@ def _amplified(attributes: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     for row in json.loads(attributes.get(AMPLIFIED, "[]")):
         value = row["amplification"]
         yield f"amplification_{row['contact']}_{row['mode']}", math.nan if value is None else float(value)
-
-
-def _text(value: object) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)
 
 
 def _linear_words(row: Row) -> str:

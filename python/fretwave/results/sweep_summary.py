@@ -227,7 +227,12 @@ def _at_reports(table: Table) -> dict[str, float]:
 
 
 def _events(table: Table) -> list[str]:
-    return [text.decode() if isinstance(text, bytes) else str(text) for text in table.get("event", ())]
+    return [text_of(text) for text in table.get("event", ())]
+
+
+def text_of(value: object) -> str:
+    """A text of a table as HDF5 or a CSV has it."""
+    return value.decode() if isinstance(value, bytes) else str(value)
 
 
 def _limit_cycles(table: Table) -> dict[str, float]:

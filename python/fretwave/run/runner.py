@@ -21,8 +21,8 @@ from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.log import event
-from ..mpi.petsc_options import TIME, AnalysisOptions, said_unread, unread_outside
-from ..mpi.petsc_share import REDUCTION, RunWide, kind_of, prefix_of
+from ..mpi.petsc_options import AnalysisOptions, said_unread, unread_outside
+from ..mpi.petsc_share import REDUCTION, TIME, RunWide, kind_of, prefix_of
 from ..mpi.petsc_values import parse
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES

@@ -193,15 +193,15 @@ def _table(file: h5py.File, folder: Path, case: Case, name: str, reader: Reader)
             for k in range(len(group["coefficients"]))
         ]
         notes = [scene.note] * bool(scene.note)
+        warnings: list[str] = []
         if rows and reader.own is not None:
             k = largest(_sizes(rows), EQUAL)
             told = _agreement(reader.own, replace(scene, choice=at_point(choice, group, case, k)), rows[k])
             warnings = [line[len(WARNING) :] for line in told if line.startswith(WARNING)]
-            rows[k] |= {DOUBT.name: "; ".join(warnings)} if warnings else {}
+            rows[k][DOUBT.name] = "; ".join(warnings)
             notes += told
-    doubt = [DOUBT] if any(DOUBT.name in row for row in rows) else []
+    columns = [*_lead_columns(group, lead), *reader.columns(choice.wheel), *([DOUBT] if warnings else [])]
     rows = [{DOUBT.name: "", **row} for row in rows]
-    columns = [*_lead_columns(group, lead), *reader.columns(choice.wheel), *doubt]
     return StressTable(name, [column.in_units(choice.units) for column in columns], rows, notes)
 
 

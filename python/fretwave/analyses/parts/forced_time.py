@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...case.observed import unit_of
-from ...mpi.petsc_options import TIME
+from ...mpi.petsc_share import TIME
 from ...post.response_peaks import points_around_peak
 from ...solve.steady import SteadyState, steady_motion
 from ...texts import counted

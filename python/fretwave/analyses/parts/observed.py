@@ -50,8 +50,13 @@ def observed_amplitude(context: AnalysisContext[AnalysisSection], seen: Observed
     """What an analysis sees of a linear motion as it is scaled. Collective."""
     from ...hb.observed import row_of
 
+    return _along(row_of(context.model, seen), mode)
+
+
+def _along(row: Sequence[tuple[int, float]], mode: LinearMode) -> float:
+    """Modulus of a linear motion along a row of (dof, weight)."""
     phi = mode.shape + 1j * mode.imaginary
-    return float(abs(sum(weight * phi[dof] for dof, weight in row_of(context.model, seen))))
+    return float(abs(sum(weight * phi[dof] for dof, weight in row)))
 
 
 def normalised_amplitude(context: AnalysisContext[Any], seen: Observed, mode: LinearMode) -> float:
@@ -64,9 +69,10 @@ def normalised_amplitude(context: AnalysisContext[Any], seen: Observed, mode: Li
     """
     from ...hb.observed import row_of
 
-    heaviest = max((abs(weight) for _, weight in row_of(context.model, seen)), default=0.0)
+    row = row_of(context.model, seen)
+    heaviest = max((abs(weight) for _, weight in row), default=0.0)
     largest = heaviest * max(np.abs(mode.shape).max(), np.abs(mode.imaginary).max())
-    amplitude = observed_amplitude(context, seen, mode)
+    amplitude = _along(row, mode)
     if amplitude < STANDS_STILL * largest:
         raise InputError(
             "what is normalised does not move in the starting mode",

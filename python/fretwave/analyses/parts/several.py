@@ -25,13 +25,16 @@ def with_stopped(stopped: Mapping[int, str], **own: float) -> dict[str, Any]:
     return {**own, STOPPED: np.frombuffer(json.dumps(dict(stopped)).encode(), dtype=np.uint8)}
 
 
-def ending_of(stopped: Mapping[int, str], branches: Sequence[Any]) -> tuple[str, str, dict[str, str]]:
+def ending_of(
+    stopped: Mapping[int, str], branches: Sequence[Any], all_done: str = "stop value reached"
+) -> tuple[str, str, dict[str, str]]:
     """Status, reason, and as an attribute of the results those branches that came to their end.
 
     Parameters
     ----------
-    branches : what tells them apart in the table: levels, nodal diameters
+    branches : what tells them apart in the table: levels, nodal diameters, numbers of starts
+    all_done : the reason where none stopped
     """
     ended = [branch for number, branch in enumerate(branches) if number not in stopped]
-    reason = "; ".join(stopped.values()) or "stop value reached"
+    reason = "; ".join(stopped.values()) or all_done
     return "stopped" if stopped else "done", reason, {ENDED: json.dumps(ended)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -17,11 +16,11 @@ from ...errors import InputError, NotConverged
 from ...post.cycles import Cycles, above_noise, extract, noise_floor
 from ...post.decays import mode_state
 from ...post.settling import growth_trend
-from ...results.file import ENDED
 from ...solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
 from ...texts import counted
 from .context import AnalysisContext, Outcome
 from .observed import row_on
+from .several import ending_of
 from .whole import integrated_model
 
 if TYPE_CHECKING:
@@ -171,9 +170,9 @@ class Starts:
 
     def finish(self, lines: list[str], **attributes: Value) -> Outcome:
         """Close the table."""
-        reason = "; ".join(self.stopped.values()) or "all starts integrated"
-        ended = json.dumps([number for number in range(len(self.section.amplitude)) if number not in self.stopped])
-        self.writer.close("stopped" if self.stopped else "done", reason, **{ENDED: ended}, **attributes)
+        numbers = range(len(self.section.amplitude))
+        status, reason, ended = ending_of(self.stopped, numbers, "all starts integrated")
+        self.writer.close(status, reason, **ended, **attributes)
         goal = f"{self.section.periods} periods of every start"
         advice = f"--set {self.context.name}.tolerance=1e-6, fewer periods, or a smoother contact law"
         return Outcome(self.writer.rows, reason, not self.stopped, lines, goal, advice)
