@@ -69,3 +69,11 @@ def test_a_motion_has_a_size_whose_square_is_a_number(key: str) -> None:
     """A level of 1e155 ended in Python's own error, an amplitude of that as a mode that sticks."""
     found = problems(f"{key}=[1.0, 1e155]")
     assert "<= 1e+150" in str(found[0].expected) and found[0].fix
+
+
+@pytest.mark.parametrize("loaded, refused", [("mode", "free_decay"), ("flutter", "limit_cycle"), ("forced", "forced")])
+def test_a_preload_is_refused_wherever_it_is_given(loaded: str, refused: str) -> None:
+    """An analysis' own one was not seen: its motions in time lacked the load, steady ones by 0.98 of themselves."""
+    [problem] = problems(f"{loaded}.preload={{}}")
+    assert problem.what.startswith(refused) and "does not know a preload" in problem.what
+    assert problem.fix and (loaded == refused or f"the preload of '{loaded}'" in problem.fix)

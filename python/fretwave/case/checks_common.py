@@ -10,6 +10,7 @@ from ..files.memory import machine_memory, size
 from ..model.laws import law_like
 from ..mpi.petsc_values import parse
 from ..texts import nearest, toml
+from .observed import given_to
 from .reporter import Reporter
 from .schema import PreloadSection
 from .toml.validation import at
@@ -41,7 +42,7 @@ def check_common(report: Reporter, analysis: AnalysisSection, facts: Facts) -> N
         own = Reporter(report.source, (*report.path, "preload"), report.found)
         check_loads(own, analysis.own_preload(), facts.loads)
     if analysis.integrates():
-        _check_time_integration(report, analysis.integrates(), facts)
+        _check_time_integration(report, analysis, analysis.integrates(), facts)
     if facts.model_known:
         _check_size(report, analysis, facts)
 
@@ -62,12 +63,21 @@ def check_loads(report: Reporter, section: Optional[PreloadSection], known: Sequ
             report.wrong(("loads", index), "is no load of the model", f"one of {named}", fix)
 
 
-def _check_time_integration(report: Reporter, key: str, facts: Facts) -> None:
+def _loaded_by(analysis: AnalysisSection, facts: Facts) -> str:
+    """What gives an analysis a static state: its own key, that of the mode it starts from, the case; empty if none."""
+    for name in (analysis.name, *analysis.decided_by()):
+        if given_to(facts, name, "preload") is not None:
+            return f"the preload of '{name}'"
+    return "[preload]" if facts.preload is not None else ""
+
+
+def _check_time_integration(report: Reporter, analysis: AnalysisSection, key: str, facts: Facts) -> None:
     """It sees the present motion of a whole structure alone: no wave, no preload, no place of a slider."""
     whole = key == "type"
-    if facts.preload is not None:
+    loaded = _loaded_by(analysis, facts)
+    if loaded:
         what, expected = "needs time integration, which does not know a preload", "analyses of harmonic balance"
-        report.wrong((key,), what, expected, "remove the analysis, or [preload]" if whole else f"write `{key} = 0`")
+        report.wrong((key,), what, expected, f"remove the analysis, or {loaded}" if whole else f"write `{key} = 0`")
     if facts.model_known and facts.neighbours is not None:
         about(report, key, "integrates in time, which one sector cannot", "harmonic balance", "remove it")
     named = next((c for c in facts.contacts if getattr(facts.laws.get(str(c.law)), "memory", False)), None)
