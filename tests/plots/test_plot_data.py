@@ -171,17 +171,26 @@ def test_a_sweep_draws_the_branch_of_every_value(tmp_path, comm):
     assert damping_axes.get_ylabel() == "Largest damping ratio ζ [%]"
 
 
-def write_ellipses(folder, method="CNM"):
-    """x1 = a cos t, x2 = a/2 sin t, and a contact that moves like a ellipse of work pi a b."""
+def write_ellipses(folder, method="CNM", mean=None):
+    """x1 = a cos t, x2 = a/2 sin t, and a contact that moves like a ellipse of work pi a b.
+
+    About a mean of each of three dofs, where there is one, the third of which stands still.
+    """
     described = {"type": "mode", "method": method, "normalise": "one"}
-    writer = AnalysisWriter(folder, "mode", MODE, described, ["one", "two"], ["1c", "1s"])
+    dofs, labels, shape = ["one", "two"], ["1c", "1s"], np.array([[1.0, 0.0], [0.0, 0.5]])
+    if mean is not None:
+        dofs, labels, shape = [*dofs, "three"], ["0", *labels], np.vstack([shape, [0.0, 0.0]])
+    writer = AnalysisWriter(folder, "mode", MODE, described, dofs, labels)
     for point, a in enumerate((0.1, 0.2, 0.4)):
         row = {"point": point, "amplitude": a, "omega": 3.0, "omega0": 5.0, "frequency_hz": 3.0 / (2 * np.pi)}
         row |= {"beta": 0.0, "zeta": 0.01 * a, **SHARED, "event": "report"}
         u, f = np.zeros((64, 1, 2)), np.zeros((64, 1, 2))
         u[:, 0, 1], f[:, 0, 1] = a * np.cos(TAU), -7.0 * np.sin(TAU)
         v = np.gradient(u, axis=0)
-        writer.append(row, a * np.array([[1.0, 0.0], [0.0, 0.5]]), {"pad": {"u": u, "v": v, "f": f}})
+        q = a * shape
+        if mean is not None:
+            q, u, f = np.column_stack([mean, q]), u + mean[0], f + 100.0
+        writer.append(row, q, {"pad": {"u": u, "v": v, "f": f}})
     writer.close("done", "")
     return Run(folder)["mode"]
 
@@ -210,6 +219,22 @@ def test_hysteresis_is_that_of_the_pair_that_works(tmp_path):
         assert (x[0], y[0]) == (x[-1], y[-1]) and len(x) == 65
     assert left.get_ylabel() == "Contact force [N]"
     np.testing.assert_allclose(np.hypot(*right.lines[0].get_xydata().T), 1, rtol=ROUNDING)
+
+
+def test_what_is_scaled_to_the_amplitude_leaves_the_static_state_out(tmp_path):
+    """Its displacement over the amplitude said nothing, and chose the dof that is drawn: that which moves is."""
+    found = write_ellipses(tmp_path, mean=[3.0, -2.0, 50.0])
+    left, right = trajectories.draw(found).axes
+    np.testing.assert_allclose(left.lines[0].get_xydata().mean(axis=0), [3.0, -2.0], atol=0.1)
+    lower = phase_planes.planes(found).axes[2]
+    loops_left, loops_right = phase_planes.loops(found, "pad").axes
+    np.testing.assert_allclose(loops_left.lines[0].get_xydata()[:-1].mean(axis=0), [3.0, 100.0], rtol=ROUNDING)
+    for axes, half in ((right, 0.5), (lower, 1.0), (loops_right, 1.0)):
+        for line in axes.lines:
+            x, y = line.get_xydata().T
+            np.testing.assert_allclose(np.hypot(x, y / half), 1, rtol=1e-12)
+        assert "from its mean" in axes.get_xlabel()
+    assert left.get_ylabel() == "Displacement of two [m]"
 
 
 def test_loops_in_space_are_in_microns_along_the_slip_and_under_the_normal_force(tmp_path):

@@ -12,7 +12,7 @@ from ..arrays import AnyArray
 from ..results.analysis import Analysis, motion_of
 from ..results.reader import Run
 from . import scales, style
-from .trajectories import CURVES, FEW_DOFS, amplitude_name, other_dof, spread
+from .trajectories import CURVES, FEW_DOFS, about, amplitude_name, from_mean, other_dof, spread
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -28,7 +28,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 
 def planes(mode: Analysis) -> Figure:
-    """Velocity against displacement, a column per dof: as they are, and below divided by a and a omega."""
+    """Velocity against displacement, a column per dof: as they are, and below from the mean over a and a omega."""
     dofs = [mode.normalised_dof(), other_dof(mode)] if len(mode.dofs) > 1 else [0]
     points = spread(mode, CURVES)
     figure, axes = style.new_figure(7.2, rows=2, columns=len(dofs), squeeze=False)
@@ -47,14 +47,14 @@ def _plane(upper: Axes, lower: Axes, mode: Analysis, points: Sequence[int], dof:
         x, v = motions[point]
         a, omega = mode.columns["amplitude"][point], mode.columns["omega"][point]
         upper.plot(length(x), speed(v), color=colour, label=amplitude_name(mode, point))
-        lower.plot(x / a, v / (a * omega), color=colour)
+        lower.plot(from_mean(x) / a, v / (a * omega), color=colour)
     upper.set_xlabel(length.label(f"Displacement of {name}"))
     upper.set_ylabel(speed.label(f"Velocity of {name}"))
-    lower.set(xlabel=f"Displacement of {name} / a", ylabel=f"Velocity of {name} / (a ω)")
+    lower.set(xlabel=f"Displacement of {name}{about(mode)} / a", ylabel=f"Velocity of {name} / (a ω)")
 
 
 def loops(mode: Analysis, contact: str) -> Figure:
-    """Force against relative displacement of the pair that dissipates most: as it is, and both scaled to one."""
+    """Force against relative displacement of the pair that works most: as it is, and from their means scaled to one."""
     points = kept_points(mode)
     pair = _busiest(mode, contact, points[-1])
     closed = [_closed(mode, contact, point, pair) for point in points]
@@ -63,10 +63,12 @@ def loops(mode: Analysis, contact: str) -> Figure:
     figure, (left, right) = style.new_figure(4.3, columns=2)
     for point, (u, f), colour in zip(points, closed, style.shades(len(points))):
         left.plot(length(u), force(f), color=colour, label=amplitude_name(mode, point))
-        right.plot(u / np.abs(u).max(), f / max(np.abs(f).max(), 1e-300), color=colour)
+        u, f = from_mean(u), from_mean(f)
+        right.plot(u / max(np.abs(u).max(), 1e-300), f / max(np.abs(f).max(), 1e-300), color=colour)
     left.set_xlabel(length.label("Relative displacement"))
     left.set_ylabel(force.label("Contact force"))
-    right.set(xlabel="Relative displacement / its maximum", ylabel="Contact force / its maximum")
+    swing = f"{about(mode)} / its maximum"
+    right.set(xlabel=f"Relative displacement{swing}", ylabel=f"Contact force{swing}")
     title = f"Contact {contact}{'' if pair[1] == 0 else f', pair {pair[1]}'}: modal amplitude, {mode.method()}"
     style.legend_outside(figure, left, columns=CURVES, title=title)
     return figure

@@ -27,7 +27,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 
 def draw(mode: Analysis) -> Figure:
-    """Left as they are, right divided by the amplitude, which shows curvature and opening at every level."""
+    """Left as they are, right from their means and divided by the amplitude: curvature and opening at every level."""
     points = spread(mode, CURVES)
     across, up = mode.normalised_dof(), other_dof(mode)
     motions, scale = displacements(mode, points)
@@ -36,10 +36,12 @@ def draw(mode: Analysis) -> Figure:
         amplitude = mode.columns["amplitude"][point]
         x = motions[point]
         left.plot(scale(x[:, across]), scale(x[:, up]), color=colour, label=amplitude_name(mode, point))
+        x = from_mean(x)
         right.plot(x[:, across] / amplitude, x[:, up] / amplitude, color=colour)
     left.set(xlabel=scale.label(f"Displacement of {mode.dofs[across]}"))
     left.set(ylabel=scale.label(f"Displacement of {mode.dofs[up]}"))
-    right.set(xlabel=f"{mode.dofs[across]} / modal amplitude", ylabel=f"{mode.dofs[up]} / modal amplitude")
+    swing = f"{about(mode)} / modal amplitude"
+    right.set(xlabel=f"{mode.dofs[across]}{swing}", ylabel=f"{mode.dofs[up]}{swing}")
     style.legend_outside(figure, left, columns=CURVES, title=f"Modal amplitude, {mode.method()}")
     return figure
 
@@ -50,6 +52,16 @@ def displacements(mode: Analysis, points: Sequence[int]) -> tuple[dict[int, AnyA
     return found, scales.linear(mode.unit_system, mode.length_unit(), *found.values())
 
 
+def from_mean(closed: AnyArray) -> AnyArray:
+    """What swings of a closed period (n + 1, ...), without the place that it swings about."""
+    return np.asarray(closed - closed[:-1].mean(axis=0))
+
+
+def about(mode: Analysis) -> str:
+    """Beside a dof whose mean is taken off; empty where a mode has no mean."""
+    return " from its mean" if "0" in mode.labels else ""
+
+
 def amplitude_name(mode: Analysis, point: int) -> str:
     """The point's amplitude with its unit."""
     return scales.amplitudes(mode).text(mode.columns["amplitude"][point])
@@ -58,7 +70,7 @@ def amplitude_name(mode: Analysis, point: int) -> str:
 def other_dof(mode: Analysis) -> int:
     """The dof whose motion differs most from the normalised one: where the contact is felt."""
     across = mode.normalised_dof()
-    x, _ = motion_of(mode, int(np.argmax(mode.columns["zeta"])))
+    x = from_mean(motion_of(mode, int(np.argmax(mode.columns["zeta"])))[0])
     reference = x[:, across]
     share = x.T @ reference / (reference @ reference)
     rest = np.linalg.norm(x - np.outer(reference, share), axis=0)
