@@ -1,4 +1,4 @@
-"""Contact pairs drawn where they lie on their faces: normal load at rest, and stick, slip and open in a mode."""
+"""Contact pairs drawn where they lie on their faces: load at rest, and stick, slip and open in a mode."""
 
 from __future__ import annotations
 
@@ -40,11 +40,15 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 
 def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure:
-    """Normal force of every pair at the largest load factor; the shape of the mark tells its status."""
+    """Normal force of every pair at the largest load factor; the shape of the mark tells its status.
+
+    Of a law without a normal direction the tangential force.
+    """
     rows = (table["contact"] == contact) & (table["factor"] == table["factor"].max())
-    status = table["status"][rows]
-    scale = scales.linear(static.unit_system, static.unit_system("force"), table["normal_force"][rows])
-    force, (pairs, unit) = scale(table["normal_force"][rows]), placed(static.pairs(contact), static.unit_system)
+    status, known = table["status"][rows], np.isfinite(table["normal_force"][rows]).all()
+    shown, what = (table["normal_force"], "normal force") if known else (table["tangential_force"], "tangential force")
+    scale = scales.linear(static.unit_system, static.unit_system("force"), shown[rows])
+    force, (pairs, unit) = scale(shown[rows]), placed(static.pairs(contact), static.unit_system)
     digits = max(0, 1 - int(np.floor(np.log10(force.max() or 1.0))))
     names = list(dict.fromkeys(pairs["face"]))
     figure, panels = style.new_figure(1.2 + 1.9 * len(names), rows=len(names), sharex=True, squeeze=False)
@@ -60,9 +64,9 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
         place_face(axes, name, pairs["position"])
         axes.set_ylabel(style.label("Up the face", unit))
     panels[-1, 0].set_xlabel(style.label("Along the face", unit))
-    figure.colorbar(dots, ax=panels, label=scale.label("Normal force"), shrink=0.8)
+    figure.colorbar(dots, ax=panels, label=scale.label(what.capitalize()), shrink=0.8)
     counts = ", ".join(f"{int((status == word).sum())} {word}" for word in marks)
-    total = f"normal forces {force.sum():.4g} {scale.unit}"
+    total = f"{what}s {force.sum():.4g} {scale.unit}"
     text = f"Contact {contact} at rest, load factor {table['factor'].max():g}: {total}; {counts}"
     figure.suptitle(text, fontsize=11.5)
     return figure
