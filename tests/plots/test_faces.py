@@ -62,5 +62,8 @@ def test_loads_at_rest_and_maps_are_drawn_whatever_the_law(tmp_path: Path, law: 
     assert set(drawn) == {"static_load_pads", "mode_map_pads"}
     load = drawn["static_load_pads"]
     assert load.axes[-1].get_ylabel() == label
+    assert call("report", tmp_path / "run") == 0
+    told = "largest normal force" in (tmp_path / "run" / "report.html").read_text()
+    assert told == (total is None)
     if total is not None:
         assert f"tangential forces {total:.4g} N; 0 stick, 2 slip" in load._suptitle.get_text()

@@ -136,8 +136,9 @@ def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
     top = peak_row(columns, rows)
     if top is not None and ("level" in columns or varies(columns["zeta"][rows])):
         yield top, "largest damping" if "zeta" in columns else f"largest amplitude{whose_amplitude(columns)}"
-    if "level" not in columns and "normal_force" in columns:
-        yield int(rows[largest(columns["normal_force"][rows])]), "largest normal force"
+    for name in ("normal_force", "tangential_force") if "level" not in columns else ():
+        if name in columns and np.isfinite(columns[name][rows]).any():  # of a law without a normal direction none is
+            yield int(rows[largest(columns[name][rows])]), f"largest {name.replace('_', ' ')}"
     for name in ("zeta_error", "amplitude_error"):
         errors = columns.get(name, np.empty(0))
         if len(errors) and np.isfinite(errors[rows]).any():
