@@ -122,6 +122,17 @@ def beyond_basis(basis: Expansion, loads: Sequence[str]) -> tuple[Array, str]:
     return basis.beyond(known) if known else np.zeros(1), note if left else ""
 
 
+def of_tuned_sector(case: Case, choice: Choice, beyond: Array) -> str:
+    """A note on a mistuned wheel: its sectors have what no coordinate has of the static displacement as tuned ones."""
+    mistuned = choice.wheel and case.analyses[choice.name].whole_wheel()[1] is not None
+    if not mistuned or not np.any(beyond):
+        return ""
+    return (
+        "note: of the displacement at rest, what no component mode has is that of the tuned sector: relative errors of"
+        " the size of the sectors' deviations; without [reduction] it is exact"
+    )
+
+
 def without_rest(case: Case, choice: Choice) -> str:
     """A note on a driven wheel about a preload whose state at rest an earlier version did not keep; else nothing."""
     analysis = case.analyses[choice.name]

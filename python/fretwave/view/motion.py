@@ -24,7 +24,7 @@ from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
 from ..texts import display
 from .choice import Choice
-from .expansion import Expand, beyond_basis, expansion_of, without_rest
+from .expansion import Expand, beyond_basis, expansion_of, of_tuned_sector, without_rest
 from .geometry import geometry
 from .options import natural_scale
 
@@ -186,7 +186,7 @@ def scene_of(
             basis = expansion_of(case, choice, folder, around, stack)
             expand, ties = basis.expand, basis.ties or ties
             beyond, missing = beyond_basis(basis, _loads(case, choice))
-            note = note or missing
+            note = note or missing or of_tuned_sector(case, choice, beyond)
         given, shown = moving or geometry(case), _shown(case, around, sectors)
         to_dofs, to_nodes = _to_dofs(expand, beyond), _to_nodes(given, len(nodes))
         yield Scene(nodes, choice, to_dofs, to_nodes, shown, ties, around, given.axis or "z", note)
