@@ -269,6 +269,16 @@ def test_range_of_a_slider(amplitude: float, slips: float) -> None:
     assert slip_range(one)[0] == pytest.approx(2 * amplitude, rel=TIGHT)
 
 
+@pytest.mark.parametrize("mean", [0.0, 0.3, 300.0])
+def test_a_pair_that_sticks_has_no_range_of_rounding(mean: float) -> None:
+    """The rounding of u - f / kt, beside a static displacement, stood in the table as a path of the slider."""
+    u = (mean + 1e-6 * np.cos(2 * np.pi * np.arange(64) / 64))[:, None, None]
+    history = ContactHistory(u, 0 * u, 7.3 * u, np.zeros((64, 1), dtype=np.int8))
+    assert slip_range(history, np.array([7.3]))[0] == 0.0
+    slips = ContactHistory(u, 0 * u, 0 * u, np.ones((64, 1), dtype=np.int8))
+    assert slip_range(slips, np.array([7.3]))[0] == pytest.approx(2e-6, rel=1e-6)
+
+
 def test_open_pairs_do_not_slip() -> None:
     """The displacement of an open pair moves no slider."""
     u, closed = np.linspace(0.0, 1.0, 5)[:, None, None], np.zeros((5, 1, 1))

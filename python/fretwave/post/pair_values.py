@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..columns import Column
-from ..model.law_info import OPEN, STATUS
+from ..model.law_info import OPEN, STATUS, STICK
 from .contact_history import ContactHistory
 
 #: Directions in which the extent of a path in the plane is looked at; the largest of them is short by 2e-4 at most.
@@ -72,8 +72,11 @@ def slip_range(history: ContactHistory, stiffness: Array | None = None) -> Array
         path = np.where((history.status == OPEN)[:, None], np.nan, path)
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS if len(rows) == 2 else np.zeros(1)
     turns = np.column_stack([np.cos(angles), np.sin(angles)])[:, : len(rows)]
-    extents = [_extent(np.einsum("c,ncp->np", turn, path)) for turn in turns]
-    return np.asarray(np.max(extents, axis=0))
+    found = np.max([_extent(np.einsum("c,ncp->np", turn, path)) for turn in turns], axis=0)
+    if stiffness is None or history.status is None:
+        return np.asarray(found)
+    # of what sticks the rounding of u and f, which grows with the static load
+    return np.asarray(np.where((history.status == STICK).all(axis=0), 0.0, found))
 
 
 def _extent(values: Array) -> Array:
