@@ -131,6 +131,17 @@ def test_a_branch_without_slip_has_no_amplitude_of_its_damping(damping: float) -
     assert found["largest_zeta"] == pytest.approx(damping, rel=SOLVED, abs=1e-15)
 
 
+@pytest.mark.parametrize("error", [2.6e-10, 1e-13])
+def test_the_error_of_a_first_point_is_no_onset_of_damping(error: float) -> None:
+    """Of a preloaded beam whose damping falls from first slip on: it had risen by 6e-12 behind the first point."""
+    amplitude = np.linspace(1e-6, 1e-5, 5)
+    zeta = 5.1664e-3 + np.array([0.0, 5.76e-12, 5.75e-12, -5.5e-6, -3.6e-6])
+    table = {"amplitude": amplitude, "zeta": zeta, "zeta_error": np.array([error, 1e-13, 1e-13, 1e-4, 1e-4])}
+    table |= {"slip": np.array([0.0, 0.0, 0.0, 0.01, 0.02]), "stick": np.array([1.0, 1.0, 1.0, 0.99, 0.98])}
+    table |= {name: np.full(5, 1.4e4) for name in ("omega", "omega0", "frequency_hz")} | {"event": [""] * 5}
+    assert np.isnan(summarise("mode", table, {})["onset_amplitude"]) == (error > 6e-12)
+
+
 def test_of_a_driven_wheel_the_line_is_of_the_sector_that_moves_most() -> None:
     row = {"unit": "m", "largest_amplitude": 0.2, "frequency_of_largest_amplitude": 10.0}
     blade = {"largest_blade_amplitude": 0.9, "largest_blade_frequency_hz": 11.0}

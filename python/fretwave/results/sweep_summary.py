@@ -183,7 +183,8 @@ def summarise(
 def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]) -> dict[str, float]:
     amplitude, frequency, zeta = (np.asarray(table[name]) for name in ("amplitude", "frequency_hz", "zeta"))
     top, low = most_damped(zeta), lowest(frequency)
-    rises = top > 0
+    error = float(np.nan_to_num(np.asarray(table["zeta_error"], dtype=float)[0])) if "zeta_error" in table else 0.0
+    rises = top > 0 and float(zeta[top] - zeta[0]) > error  # what the first point is wrong by is no rise
     slips = np.flatnonzero(table["slip"] > 0)
     first = int(slips[0]) if len(slips) else len(zeta)
     other = attributes.get("free_omega", attributes.get("sliding_omega", np.nan))
