@@ -143,3 +143,48 @@ def test_a_branch_ends_where_it_can_get_to(stop: Any, worn: fw.Branch) -> None:
 def test_a_branch_is_one_of_a_problem(worn: fw.Branch) -> None:
     assert "Branch" in refused(lambda: fw.follow(worn, 0.1, 0.2))  # type: ignore[arg-type]
     assert "LinearMode" in refused(lambda: fw.follow(MODE, 0.1, 0.2))  # type: ignore[arg-type]
+
+
+#: Numbers that are not whole, where a place is meant: each was rounded down, or gave numbers of no wave.
+NOT_WHOLE: dict[str, Callable[[], object]] = {
+    "travelling": lambda: fw.travelling_wave(MODE, 1.5, 6),  # type: ignore[arg-type]
+    "standing": lambda: fw.standing_wave(MODE, 1.5, 6, 0),  # type: ignore[arg-type]
+    "wave of the flow": lambda: fw.Aerodynamics({0: 1.0}, 1.0).wave(0.5, 6),  # type: ignore[arg-type]
+    "ratios of the flow": lambda: fw.Aerodynamics.from_damping({0.5: 0.1}, 6, 1.0),  # type: ignore[dict-item]
+    "blade": lambda: fw.Aerodynamics({0.5: 1.0}, 1.0),  # type: ignore[dict-item]
+    "face": lambda: fw.match_faces(np.eye(3), [0.7], [1.2], 4),
+    "mask": lambda: fw.match_faces(np.eye(3), [True, False, False], [False, True, False], 4),
+    "interface": lambda: fw.reduce_sector(np.eye(3), np.eye(3), [0], [2], 6, interface_diameters=[0.5]),  # type: ignore[list-item]
+    "ratio of a mode": lambda: fw.modal_damping(M, K, {1.5: 0.1}),  # type: ignore[dict-item]
+}
+
+
+@pytest.mark.parametrize("name", NOT_WHOLE)
+def test_places_and_waves_are_whole_numbers(name: str) -> None:
+    assert re.search("whole number|mode that is not there|integers", refused(NOT_WHOLE[name]))
+
+
+@pytest.mark.parametrize("dof", [0.5, -1, 2, "0", None], ids=repr)
+def test_dampers_flow_and_names_are_of_dofs_that_there_are(dof: Any) -> None:
+    """A half was rounded down, -1 SciPy's own error, of a shape the last dof."""
+    assert "0 to 1" in refused(lambda: fw.Structure(M, K).damped([(dof, 1.0)]))
+    assert "0 to 1" in refused(lambda: fw.WheelShape(np.eye(12), 6, dof, 1.0))
+    assert "dof 'a'" in str(fw.Structure(M, K, dofs={"a": dof}).complaint())
+    if dof is not None:
+        assert "0 .. 1" in refused(lambda: fw.Aerodynamics({0: 1.0}, 1.0, dof).terms(M))
+
+
+@pytest.mark.parametrize("constant", [NAN, "1", None, 1j], ids=repr)
+def test_a_damper_has_a_number(constant: Any) -> None:
+    assert "damper constant" in refused(lambda: fw.Structure(M, K).damped([(0, constant)]))
+
+
+@pytest.mark.parametrize("omega", [0.0, NAN, INF, "1", None, 1j], ids=repr)
+def test_a_flow_has_a_frequency(omega: Any) -> None:
+    assert "frequency" in refused(lambda: fw.Aerodynamics({0: 1.0}, omega))
+
+
+@pytest.mark.parametrize("ratios", [{1: 0.1, 7: 0.2}, {3: 0.1, -3: 0.2}, {-1: 0.1, 5: 0.1}], ids=str)
+def test_a_wave_of_the_flow_has_one_ratio(ratios: dict[int, float]) -> None:
+    """The last one was taken."""
+    assert "one wave has two" in refused(lambda: fw.Aerodynamics.from_damping(ratios, 6, 1.0))

@@ -29,14 +29,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
+from operator import index
 from typing import Optional
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..given import numbers
-from ..model.sectors import Term, by_sector, check_number, real_csr
+from ..given import numbers, whole
+from ..model.sectors import Term, by_sector, check_number, check_wave, real_csr
 from ..model.wheel_matrix import Matrix, as_matrix
 from .engine_order import folded
 
@@ -68,9 +70,12 @@ class Aerodynamics:
     dof: Optional[int] = None
 
     def __post_init__(self) -> None:
-        if not 0 < self.omega < math.inf:
+        if not (isinstance(self.omega, Real) and 0 < self.omega < math.inf):
             raise InputError("influence coefficients need a frequency", None, self.omega, "> 0 rad/s", "give omega")
         for k, L in self.influence.items():
+            if whole(k) is None:
+                what, fix = "an influence coefficient is of no blade", "give {0: own, 1: of the next blade, ...}"
+                raise InputError(what, None, repr(k), "a whole number of places ahead", fix)
             numbers(f"influence coefficient {k}", [getattr(L, "real", L), getattr(L, "imag", 0.0)], (2,))
 
     def __repr__(self) -> str:
@@ -83,10 +88,10 @@ class Aerodynamics:
 
         A modal viscous damper: L(theta) = -2 i zeta omega^2. Nodal diameters that are not named have none.
         """
-        check_number(sectors)
+        sectors = check_number(sectors)
         wave = np.zeros(sectors, dtype=complex)
-        for nodal_diameter, ratio in ratios.items():
-            wave[nodal_diameter % sectors] = -2j * float(numbers("damping ratio", ratio)) * omega**2
+        for place, ratio in _by_wave(ratios, sectors).items():
+            wave[place] = -2j * float(numbers("damping ratio", ratio)) * omega**2
         parts = np.fft.ifft(wave)  # 1/N sum_d L(theta_d) e^{+2 pi i k d / N}
         largest = np.abs(parts).max()
         kept = [k for k in range(sectors) if abs(parts[k]) > NOTHING * largest]
@@ -94,6 +99,7 @@ class Aerodynamics:
 
     def wave(self, nodal_diameter: int, sectors: int) -> complex:
         """L(theta) of a wave, [force/length] at a dof, [1/s^2] modal."""
+        sectors, nodal_diameter = check_wave(sectors, nodal_diameter)
         theta = 2 * np.pi * nodal_diameter / sectors
         return complex(sum(L * np.exp(-1j * k * theta) for k, L in self.influence.items()))
 
@@ -108,7 +114,7 @@ class Aerodynamics:
             Of one wave: blades so many places apart move alike in all its harmonics, and their terms are one.
         """
         added: dict[str, Added] = {"K": {}, "C": {}}
-        for k, L in self.influence.items():
+        for k, L in ((index(k), L) for k, L in self.influence.items()):
             for ahead, shape in self._shape(M).items():
                 place = k + ahead if period is None else folded(k + ahead, period)
                 for letter, value in (("K", -L.real), ("C", -L.imag / self.omega)):
@@ -122,9 +128,28 @@ class Aerodynamics:
         if self.dof is None:
             return mass
         n = mass[0].shape[0]
-        if not 0 <= self.dof < n:
+        dof = whole(self.dof)
+        if dof is None or not 0 <= dof < n:
             raise InputError("no such dof for aerodynamic forces", None, self.dof, f"0 .. {n - 1}", "name a dof")
-        return {0: sp.csr_matrix(([1.0], ([self.dof], [self.dof])), (n, n))}
+        return {0: sp.csr_matrix(([1.0], ([dof], [dof])), (n, n))}
+
+
+def _by_wave(ratios: Mapping[int, float], sectors: int) -> dict[int, float]:
+    """Ratios by nodal diameters modulo N.
+
+    Raises
+    ------
+    InputError
+        A number of nodal diameters is not whole, or two are of one wave.
+    """
+    found: dict[int, float] = {}
+    for nodal_diameter, ratio in ratios.items():
+        place = check_wave(sectors, nodal_diameter)[1] % sectors
+        if place in found:
+            what, measured = "one wave has two damping ratios", f"{sorted(ratios)} of {sectors} sectors"
+            raise InputError(what, None, measured, f"one of each {sectors} nodal diameters apart", "leave one out")
+        found[place] = ratio
+    return found
 
 
 def period_of(nodal_diameter: int, sectors: int) -> int:

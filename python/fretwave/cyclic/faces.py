@@ -63,8 +63,8 @@ def match_faces(
         With the nodes that have no partner, and what would match: the faces swapped, another number of sectors or
         axis; or for nodes on the axis, which both faces share, and such as are not there.
     """
-    points, low, high = np.asarray(xyz, dtype=float), np.asarray(low, dtype=np.intp), np.asarray(high, dtype=np.intp)
-    check_number(sectors)
+    points, low, high = np.asarray(xyz, dtype=float), _nodes("low", low), _nodes("high", high)
+    sectors = check_number(sectors)
     for node in (end for nodes in (low, high) if len(nodes) for end in (nodes.min(), nodes.max())):
         place("node", node, len(points))
     called = np.arange(len(points)) if numbers is None else np.asarray(numbers)
@@ -87,6 +87,15 @@ def match_faces(
         f"the low face turned by 360/{sectors} degrees about {axis} on the high face, to {limit:.2g}",
         fix,
     )
+
+
+def _nodes(name: str, given: npt.ArrayLike) -> Indices:
+    """Node numbers of a face; an empty list is none."""
+    found = np.asarray(given)
+    if found.size and found.dtype.kind not in "iu":
+        fix = "give node numbers, not a mask"
+        raise InputError(f"nodes of the {name} face are not whole numbers", None, str(found.dtype), "integers", fix)
+    return found.astype(np.intp)
 
 
 def _nearest(low: Array, high: Array, angle: float, axis: str) -> _Nearest:

@@ -29,7 +29,7 @@ from ..model.contact import Contact
 from ..model.frequency_error import RIGID_SHARE
 from ..model.omitted import UNKNOWN
 from ..model.reduction import Reduction, reduce
-from ..model.sectors import Given, by_sector, real_csr
+from ..model.sectors import Given, by_sector, check_number, check_wave, real_csr
 from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from ..mpi.destroyable import Destroyable
 from .interface import Interface
@@ -225,6 +225,7 @@ def reduce_sector(
     """
     start = time.perf_counter()
     comm = MPI.COMM_WORLD if comm is None else comm
+    sectors = check_number(sectors)
     diameters = _checked(interface_diameters, sectors, interface_waves)
     full = Sector.from_faces(M, K, low, high, sectors, C, contacts, axis)
     waves = SectorWaves(full, comm, diameters, contacts)
@@ -244,12 +245,13 @@ def reduce_sector(
 
 
 def _checked(diameters: Sequence[int] | None, sectors: int, waves: int) -> tuple[int, ...]:
-    given = tuple(dict.fromkeys(abs(d) for d in diameters or ()))
+    named = [] if diameters is None else list(diameters)
+    given = tuple(dict.fromkeys(abs(check_wave(sectors, d)[1]) for d in named))
     if diameters is not None and (not given or max(given) > sectors // 2 or waves < 1):
         raise InputError(
             "there are no such waves for interface modes",
             None,
-            f"{waves} of each of the nodal diameters {list(diameters)}",
+            f"{waves} of each of the nodal diameters {named}",
             f"1 or more, of nodal diameters from 0 to {sectors // 2}",
             "choose those that the motion has: the wave's, and its multiples by the harmonics",
         )

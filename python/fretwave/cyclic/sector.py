@@ -68,7 +68,7 @@ class Sector:
     units: str | None = None
 
     def __post_init__(self) -> None:
-        check_number(self.sectors)
+        object.__setattr__(self, "sectors", check_number(self.sectors))
         for name in ("K", "M", "C"):
             check_balanced(getattr(self, name), name)
 

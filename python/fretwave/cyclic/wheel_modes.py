@@ -16,7 +16,7 @@ from ..arrays import Array, Complex
 from ..errors import InputError
 from ..given import not_negative, place, whole
 from ..model.modes import LinearMode
-from ..model.sectors import check_number
+from ..model.sectors import check_number, check_wave
 from ..model.wheel_matrix import Matrix, WheelMatrix
 from ..post.largest import largest
 from .sector import Sector, wave_mode
@@ -38,7 +38,7 @@ def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tupl
     LinearMode, (N n_dof,) complex or None
         None where the wave is no double mode (0 and N/2 nodal diameters).
     """
-    check_number(sectors)
+    sectors, nodal_diameter = check_wave(check_number(sectors), nodal_diameter)
     phi = wave_mode(mode, nodal_diameter, sectors)
     return phi, None if _single(nodal_diameter, sectors) else phi.shape - 1j * phi.imaginary
 
@@ -62,7 +62,7 @@ def standing_wave(
     InputError
         There is no such dof or sector, or the dof does not move.
     """
-    check_number(sectors)
+    sectors, nodal_diameter = check_wave(check_number(sectors), nodal_diameter)
     dof, crest = place("dof", dof, len(mode.shape)), place("sector", crest, sectors)
     wave = wave_mode(mode, nodal_diameter, sectors)
     if _single(nodal_diameter, sectors):
@@ -100,7 +100,7 @@ def deviations(sectors: int, standard_deviation: float, seed: int = 1) -> Array:
     InputError
         Fewer than two sectors, a negative standard deviation or seed.
     """
-    check_number(sectors)
+    sectors = check_number(sectors)
     standard_deviation, number = not_negative("standard_deviation", standard_deviation), whole(seed)
     if number is None or number < 0:
         raise InputError("there is no such seed", None, repr(seed), "a whole number >= 0", "choose one of these")

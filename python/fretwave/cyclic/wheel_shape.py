@@ -19,8 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Complex
-from ..model.sectors import Given
-from ..model.wheel_matrix import WheelMatrix
+from ..given import place
+from ..model.sectors import Given, check_number
+from ..model.wheel_matrix import WheelMatrix, as_matrix
 from ..post.largest import largest
 from ..post.wave_content import participation, wave_content
 from .engine_order import folded
@@ -53,11 +54,14 @@ class WheelShape:
     """
 
     def __init__(self, M: Given | WheelMatrix, sectors: int, dof: int, tuned_amplitude: float) -> None:
-        self.M, self.sectors, self.dof, self.tuned_amplitude = M, sectors, dof, tuned_amplitude
+        self.M, self.sectors = as_matrix(M), check_number(sectors)
+        self.dof = place("dof", dof, self.M.shape[0] // self.sectors)
+        self.tuned_amplitude = tuned_amplitude
 
     @classmethod
     def of(cls, sector: Sector, dof: int, wave: LinearMode) -> WheelShape:
         """Against a linear wave of the tuned sector."""
+        dof = place("dof", dof, len(wave.shape))
         size = abs(wave.shape[dof] + 1j * wave.imaginary[dof])
         return cls(WheelMatrix(sector.M, sector.sectors), sector.sectors, dof, float(size / np.sqrt(sector.sectors)))
 

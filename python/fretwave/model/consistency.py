@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
+from ..given import whole
 from ..texts import nearest, shortened
 from ..units import SYSTEMS
 from .cells import wrong_cells
@@ -42,7 +43,7 @@ def complaint_of(structure: Structure) -> str | None:
         if np.shape(matrix) != (n, n):
             return f"{name} is {np.shape(matrix)[0]} x {np.shape(matrix)[1]}, M is {n} x {n}"
     for name, number in structure.dofs.items():
-        if not 0 <= number < n:
+        if whole(number) is None or not 0 <= number < n:
             return f"dof '{name}' has the number {number} of {n}"
     if structure.names is not None and (len(structure.names), len(set(structure.names))) != (n, n):
         return f"{len(structure.names)} names, {len(set(structure.names))} of them different, of {n} dofs"

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Complex
 from ..errors import InputError
-from ..given import not_negative
+from ..given import not_negative, whole
 from ..texts import counted
 from .contact import Contact
 from .sectors import Term, by_sector, check_number, real_csr
@@ -65,7 +65,7 @@ def modal_damping(
         ratio that is negative or no number.
     """
     if sectors:
-        check_number(sectors)
+        sectors = check_number(sectors)
     n = int(np.shape(by_sector(M)[0])[0])
     check_size(n, sectors)
     waves = range(sectors // 2 + 1) if sectors else range(1)
@@ -148,11 +148,12 @@ def _of_modes(ratios: Ratios, omega: Array, where: str | None) -> Array:
         return np.full(len(omega), not_negative("damping ratio", ratios))
     zeta = np.zeros(len(omega))
     for number, ratio in given.items():
-        if not 1 <= number <= len(omega):
+        known = whole(number)
+        if known is None or not 1 <= known <= len(omega):
             fix = "leave it out, or keep more component modes"
             what = "a damping ratio is of a mode that is not there"
-            raise InputError(what, where, f"mode {number}", f"1 to {counted(len(omega), 'mode')}", fix)
-        zeta[number - 1] = not_negative(f"damping ratio of mode {number}", ratio)
+            raise InputError(what, where, f"mode {number!r}", f"1 to {counted(len(omega), 'mode')}", fix)
+        zeta[known - 1] = not_negative(f"damping ratio of mode {number}", ratio)
     _check_apart(zeta, omega, where)
     return zeta
 

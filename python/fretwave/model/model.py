@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -85,14 +86,14 @@ class Model(Destroyable):
         units: str | UnitSystem = SI,
         omitted: OmittedModes | None = None,
     ) -> None:
-        check_wave(sectors, nodal_diameter)
+        sectors, nodal_diameter = check_wave(sectors, nodal_diameter)
         self.units = unit_system(units) if isinstance(units, str) else units
         self.omitted = omitted
         terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]
         first = terms[0][0]
         if comm is None:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
-        self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
+        self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, index(unit)
         self._own: list[PETSc.Mat] = [self._matrix(A, "KCM"[order], k) for A, order, k in terms]
         self._places = [(order, k) for _, order, k in terms]
         given = contact_list(contacts)

@@ -6,6 +6,7 @@ Scipy alone; `fretwave.cyclic.sector` says what a wave on such terms is.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import index
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,19 +71,21 @@ def is_by_sector(given: Term | None) -> bool:
     return isinstance(given, Mapping) and not sp.issparse(given)
 
 
-def check_wave(sectors: int, nodal_diameter: int) -> None:
-    """A wave closes around the wheel.
+def check_wave(sectors: int, nodal_diameter: int) -> tuple[int, int]:
+    """A wave closes around the wheel: both numbers as Python's own, which do not overflow as NumPy's short ones do.
 
     Raises
     ------
     InputError
     """
-    if (whole(sectors) or 0) < 1 or whole(nodal_diameter) is None:
+    number, diameters = whole(sectors) or 0, whole(nodal_diameter)
+    if number < 1 or diameters is None:
         what, measured = (
             "a wave goes a whole number of times around a wheel",
             f"sectors={sectors!r}, nodal_diameter={nodal_diameter!r}",
         )
         raise InputError(what, None, measured, "whole numbers, one sector or more", "round them")
+    return number, diameters
 
 
 def by_sector(given: Term | None) -> Parts:
@@ -97,7 +100,7 @@ def by_sector(given: Term | None) -> Parts:
         raise InputError("a matrix acts on no sector", None, measured, "whole numbers of sectors ahead", fix)
     if 0 not in given:
         raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")
-    return {k: given[k] for k in sorted(given, key=lambda k: (k != 0, k))}
+    return {index(k): given[k] for k in sorted(given, key=lambda k: (k != 0, k))}
 
 
 def in_wave(given: Term | None, q: npt.ArrayLike, theta: float) -> npt.NDArray[np.complex128]:
@@ -114,7 +117,7 @@ def around(given: Term, sectors: int, first: int = 0, end: int | None = None) ->
     first, end : int
         The rows of these sectors alone; all without them.
     """
-    parts = {k: real_csr(A) for k, A in by_sector(given).items()}
+    parts, sectors = {k: real_csr(A) for k, A in by_sector(given).items()}, index(sectors)
     side_by_side = sp.hstack(list(parts.values()), format="csr")
     n, own = parts[0].shape[1], range(first, sectors if end is None else end)
     block, column = np.divmod(side_by_side.indices, n)
@@ -143,10 +146,12 @@ def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, Sp
     return out
 
 
-def check_number(sectors: int) -> None:
-    """A wheel has neighbours."""
-    if (whole(sectors) or 0) < 2:
+def check_number(sectors: int) -> int:
+    """A wheel has neighbours: their number as Python's own (a root of NumPy's int8 is of half precision)."""
+    number = whole(sectors) or 0
+    if number < 2:
         raise InputError("a wheel has two sectors or more", None, sectors, "a whole number >= 2", "give their number")
+    return number
 
 
 def check_balanced(given: Term | None, name: str) -> None:

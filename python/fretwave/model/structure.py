@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..errors import InputError
+from ..given import numbers, place, whole
 from ..units import SI, UnitSystem, unit_system
 from .consistency import complaint_of, no_such_dof
 from .omitted import UNKNOWN, OmittedModes
@@ -127,6 +128,10 @@ class Structure:
     units: Optional[str] = None
     omitted: Optional[OmittedModes] = None
 
+    def __post_init__(self) -> None:
+        number = whole(self.sectors)  # NumPy's short ones would overflow in numbers of the wheel's dofs
+        self.sectors = self.sectors if number is None else number
+
     def __repr__(self) -> str:
         kind = "all" if self.whole else "one"
         wheel = f", {kind} of {self.sectors} sectors" if self.sectors else ""
@@ -233,7 +238,8 @@ class Structure:
                 part = shares[letter] * as_matrix(A)
                 total[k] = total[k] + part if k in total else part
         if dampers:
-            places, values = zip(*dampers)
+            places = [place("dof", dof, self.n_dof) for dof, _ in dampers]
+            values = [float(numbers("damper constant", c)) for _, c in dampers]
             added = sp.csr_matrix((values, (places, places)), shape=(self.n_dof, self.n_dof))
             total[0] = total[0] + added if 0 in total else added
         omitted = None if self.omitted is None else self.omitted.damped(self.stiffness_damping, self.mass_damping)
