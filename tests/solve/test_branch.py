@@ -167,6 +167,37 @@ def test_what_cannot_be_read_is_refused_in_words():
         fw.follow(mode(), 0.5, 0.5)
 
 
+@pytest.fixture(scope="module")
+def branch():
+    return fw.follow(mode(), 0.1, 0.5)
+
+
+READINGS = [
+    *(lambda branch, value=value: branch.at(value) for value in (np.inf, -np.inf, np.nan, "a", 1j, [0.2, None])),
+    *(lambda branch, n=n: branch.curve(n) for n in (0, -1, 1.5, "8", None)),
+    *(lambda branch, place=place: branch.unknowns(place) for place in ("1", None, [1], np.nan)),
+    *(lambda branch, row=row: branch[row] for row in (slice(1, 3), [1, 2], 1.0, None)),
+]
+
+
+@pytest.mark.parametrize("number", range(len(READINGS)))
+def test_places_that_no_branch_has_are_refused(branch, number):
+    """Both ends were told as where it is infinite, and no part of a step drew nothing; the rest were NumPy's errors."""
+    with pytest.raises(fw.InputError):
+        READINGS[number](branch)
+
+
+@pytest.mark.parametrize("value", [np.float32(0.25), np.array(0.25), [0.25], np.array([[0.25]]), (0.25,)], ids=repr)
+def test_a_value_may_be_of_any_kind(branch, value):
+    assert branch.at(value)["zeta"].tolist() == branch.at(0.25)["zeta"].tolist() != []
+
+
+@pytest.mark.parametrize("given", [{"start": "a"}, {"start": None}, {"accuracy": "1e-3"}, {"observe": [0]}], ids=repr)
+def test_what_cannot_be_followed_is_refused_in_words(given):
+    with pytest.raises(fw.InputError):
+        fw.follow(**{"problem": mode(), "start": 0.1, "stop": 0.5, **given})
+
+
 def test_saved_branch_reads_as_before(shared_tmp, comm):
     branch = fw.follow(response(), 1.8, 3.2)
     branch.save(shared_tmp / "branch.h5")

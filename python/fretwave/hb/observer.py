@@ -31,6 +31,11 @@ class Observer:
     """
 
     def __init__(self, problem: HarmonicProblem, observe: Mapping[str, Union[Observed, str]]) -> None:
+        if not isinstance(observe, Mapping):
+            fix = 'give for example observe={"tip": 3}'
+            raise InputError(
+                "columns have no names", "observe", repr(observe), "a dict of what is observed by name", fix
+            )
         self.columns = [_column(name, what) for name, what in observe.items()]
         self.rows = {name: row_of(problem.model, what) for name, what in observe.items() if not isinstance(what, str)}
         self.energies = [name for name, what in observe.items() if isinstance(what, str)]

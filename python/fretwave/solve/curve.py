@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
+from ..given import numbers, whole
 from ..hb.states import State
 from ..post.mode_curve import AT_THE_END, NO_DAMPING
 from .hermite import Cubic
@@ -59,7 +60,10 @@ class Curve:
 
     def drawn(self, n: int = PARTS) -> Table:
         """All points, and n - 1 places of the cubic between two; between straight lines none is needed."""
-        return self.read(np.arange(float(len(self.table))) if self.cubic is None else self.cubic.places(n))
+        parts = whole(n) or 0
+        if parts < 1:
+            raise InputError("a step cannot be drawn in so many parts", "n", repr(n), "a whole number >= 1", "curve(8)")
+        return self.read(np.arange(float(len(self.table))) if self.cubic is None else self.cubic.places(parts))
 
     def straight(self, error: float) -> Table:
         """All points, and so many places of the cubic between two that straight lines will do for a reader.
@@ -127,7 +131,7 @@ class Curve:
                 "the branch cannot be read at this", None, text, "one of " + ", ".join(known), f"at({known[0]}=...)"
             )
         name = next(iter(given))
-        return name, np.atleast_1d(np.asarray(given[name], dtype=float))
+        return name, numbers(name, given[name], np.shape(given[name])).ravel()
 
     def _crossings(self, name: str, value: float) -> list[float]:
         """Places where a column of the state has this value."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from petsc4py import PETSc
 
 from ..columns import FORCED, MODE, columns_named, over, with_discretisation
 from ..errors import InputError
+from ..given import numbers
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.observed import Observed, unit_of
 from ..hb.observer import Observer
@@ -99,13 +101,13 @@ def follow(
     if not isinstance(problem, HarmonicProblem) or problem.meaning is None:
         given, fix = type(problem).__name__, "give one of these; fw.Continuation follows others"
         raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
-    if accuracy is not None and not 0 < accuracy < 1:
+    if accuracy is not None and not (isinstance(accuracy, Real) and 0 < accuracy < 1):
         fix = "give for example accuracy=1e-3"
         raise InputError("accuracy is a share of what is computed", None, accuracy, "above 0, below 1", fix)
     problem.model.check_unchanged()
     own = isinstance(start, PETSc.Vec)
-    y0: PETSc.Vec = start if own else problem.initial(float(start))
-    first = problem.parameter(y0) if own else float(start)
+    first = problem.parameter(start) if own else float(numbers("start", start))
+    y0: PETSc.Vec = start if own else problem.initial(first)
     low, high, upwards = _range(first, stop)
     reports = _reports(report_at)
     settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": reports, "upwards": upwards}

@@ -10,8 +10,10 @@ import numpy as np
 
 from ..arrays import AnyArray
 from ..columns import Column, Value
+from ..errors import InputError
 from ..files.csv_table import header_line, row_line
 from ..files.whole import replaced
+from ..given import whole
 from ..units import UnitSystem
 
 #: Rows that a table's text shows before it leaves out its middle.
@@ -85,7 +87,12 @@ class Table:
             if key not in self._values:
                 raise KeyError(f"no column '{key}'; there are {', '.join(self.names)}")
             return self._values[key].copy()
-        return {name: values[key].item() for name, values in self._values.items()}
+        row = whole(key)
+        if row is None:
+            raise InputError(
+                "a row is taken by its number", None, repr(key), "one whole number", "take columns to slice"
+            )
+        return {name: values[row].item() for name, values in self._values.items()}
 
     def __iter__(self) -> Iterator[dict[str, Value]]:
         return (self[row] for row in range(len(self)))

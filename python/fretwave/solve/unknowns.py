@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
+from ..given import numbers
 from .hermite import between, derivatives, piece, slopes
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ class Unknowns:
 
     def vector(self, place: float) -> PETSc.Vec:
         """Unknowns at a place. Collective."""
+        place = float(numbers("place", place))
         if not 0 <= place <= len(self.y) - 1:
             expected, fix = f"0 to {len(self.y) - 1}", "take a row's number, or a place that `at` gives"
             raise InputError("the branch has no such place", None, place, expected, fix)
