@@ -44,7 +44,7 @@ __all__ = ["Case", "changed_keys", "load_case"]
 
 def load_case(
     path: str | Path,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | str = (),
     quick: bool = False,
     laws: Mapping[str, Any] | None = None,
     text: str | None = None,
@@ -56,7 +56,7 @@ def load_case(
     ----------
     path : str or Path
         The TOML file.
-    overrides : sequence of str
+    overrides : sequence of str, or one
         ``key=value`` of ``--set``, applied in order, after `quick`.
     quick : bool
         Apply the overrides of the ``[quick]`` table.
@@ -77,7 +77,7 @@ def load_case(
     source = Source(Path(path), text)
     if quick:
         source.apply_quick()
-    for assignment in overrides:
+    for assignment in [overrides] if isinstance(overrides, str) else overrides:
         source.apply_set(assignment)
     uncertainty = draw_values(source)
     found: list[FretwaveError] = list(source.problems)

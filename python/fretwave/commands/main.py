@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     _SubParsers = _SubParsersAction[Parser]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str | os.PathLike[str]] | None = None) -> int:
     """Entry point; returns the exit code: 0 done, 2 bad input, 3 did not converge, 130 interrupted, 141 output
     that nobody reads, 1 anything else.
     """
@@ -36,7 +36,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     install()
     _leave_networks_alone()
     with _pipes_break_in_python():
-        return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else list(arguments)))
+        return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else _words(arguments)))
+
+
+def _words(given: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Of a script, in which places are paths too."""
+    words = [os.fspath(one) if isinstance(one, os.PathLike) else one for one in given]
+    if isinstance(given, str) or not all(isinstance(one, str) for one in words):
+        fix = 'write for example main(["run", "case.toml"])'
+        raise InputError(
+            "the words of a command line are no list of texts", "main", repr(given), "texts and paths", fix
+        )
+    return words
 
 
 @contextmanager
