@@ -188,3 +188,46 @@ def test_a_flow_has_a_frequency(omega: Any) -> None:
 def test_a_wave_of_the_flow_has_one_ratio(ratios: dict[int, float]) -> None:
     """The last one was taken."""
     assert "one wave has two" in refused(lambda: fw.Aerodynamics.from_damping(ratios, 6, 1.0))
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda hidden: fw.Model(M, K, None, [fw.Contact("jenkins", [[0.0, 1.0]], hidden)]),
+        lambda hidden: fw.static_preload(fw.Model(M, K), np.ma.masked_array([1.0, 2.0], [True, False])),
+        lambda hidden: given.positive("x", hidden["tangential_stiffness"][0]),
+        lambda hidden: given.numbers("x", hidden["tangential_stiffness"], (1,)),
+    ],
+)
+def test_what_is_masked_is_no_number(work: Callable[[Any], object]) -> None:
+    """What stood behind the mask was taken."""
+    refused(lambda: work({"tangential_stiffness": np.ma.masked_array([40.0], [True]), "friction_limit": 1.0}))
+
+
+@pytest.mark.parametrize("components", [0, -1, 1.0, "1", None], ids=repr)
+def test_pairs_have_a_number_of_components(components: Any) -> None:
+    assert "components" in refused(lambda: fw.Pairs([[0.0, 1.0]], components))
+
+
+@pytest.mark.parametrize(
+    "wrong, word",
+    [
+        ({"dofs": ["a", "b"]}, "dofs are a list"),
+        ({"pairs": [fw.Pairs([[0.0, 1.0]], 1)]}, "pairs are a list"),
+        ({"pairs": {"p": [[0.0, 1.0]]}}, "no fretwave.Pairs"),
+        ({"loads": [1.0, 2.0]}, "loads are a list"),
+        ({"loads": {"g": ["1", "2"]}}, "not a number"),
+        ({"loads": {"g": [1j, 2.0]}}, "not a number"),
+        ({"parts": [K]}, "parts are a list"),
+    ],
+)
+def test_a_builder_gives_dicts_of_numbers(wrong: Any, word: str) -> None:
+    """Each was told as a defect of fretwave, or lost its imaginary part."""
+    assert word in str(fw.Structure(M, K, **wrong).complaint())
+
+
+@pytest.mark.parametrize("names", [("contact", "contact"), ("a", "a"), ("a", None), (3, "a")], ids=str)
+def test_contacts_have_names_of_their_own(names: Any) -> None:
+    """Sliders at rest go by name: those of one contact were taken for the other's, and the motion was about them."""
+    both = [fw.Contact("jenkins", [[0.0, 1.0]], {"tangential_stiffness": 4.0, "friction_limit": 1.0}, n) for n in names]
+    assert "one name" in refused(lambda: fw.Model(M, K, None, both))

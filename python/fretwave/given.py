@@ -100,10 +100,15 @@ def numbers(
     return found.astype(float)
 
 
+def masked(values: object) -> bool:
+    """Whether an entry of an array is masked: anything may stand behind it."""
+    return isinstance(values, np.ma.MaskedArray) and bool(np.any(values.mask))
+
+
 def _array(values: object) -> Array:
     """Also of rows of different lengths, as no numbers, and of Python's fractions."""
     try:
-        found = np.asarray(values)
+        found = np.asarray(None if masked(values) else values)
         fractions = found.dtype == object and all(isinstance(value, numbers_abc.Real) for value in found.flat)
         return found.astype(float) if fractions else found
     except (ValueError, OverflowError):

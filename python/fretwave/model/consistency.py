@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..given import whole
 from ..texts import nearest, shortened
 from ..units import SYSTEMS
 from .cells import wrong_cells
+from .pairs import Pairs
 from .sectors import is_by_sector
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ def no_such_dof(name: str, known: Sequence[str]) -> InputError:
 
 def complaint_of(structure: Structure) -> str | None:
     """What is inconsistent in a structure as a builder gives it, None when nothing is."""
+    unnamed = _unnamed(structure)
+    if unnamed:
+        return unnamed
     terms = {"M": structure.M, "K": structure.K, "C": structure.C}
     if not structure.sectors:  # pairs of a sector may reach the next one
         terms.update({f"B of '{name}'": pairs.B for name, pairs in structure.pairs.items()})
@@ -50,11 +54,20 @@ def complaint_of(structure: Structure) -> str | None:
     for name, load in structure.loads.items():
         if np.shape(load) != (n,):
             return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
-        if not np.all(np.isfinite(load)):
+        if np.asarray(load).dtype.kind not in "biuf" or not np.all(np.isfinite(load)):
             return f"load '{name}' has an entry that is not a number"
     return _wrong_grid(structure) or next(
         (text for text in (pairs.complaint(name, n) for name, pairs in structure.pairs.items()) if text), None
     )
+
+
+def _unnamed(structure: Structure) -> str | None:
+    """What is no dict, or no pairs."""
+    for name in ("dofs", "pairs", "loads", "parts"):
+        if not isinstance(getattr(structure, name), Mapping):
+            return f"{name} are a {type(getattr(structure, name)).__name__}, not a dict by name"
+    others = [name for name, pairs in structure.pairs.items() if not isinstance(pairs, Pairs)]
+    return f"pairs '{others[0]}' are no fretwave.Pairs" if others else None
 
 
 def _wrong_grid(structure: Structure) -> str | None:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ..arrays import Array
 from ..errors import InputError
+from ..given import masked
 from ..texts import shortened
 from .law_info import LawInfo, ParameterInfo, Role
 from .laws import core_law, laws, springs
@@ -202,7 +203,7 @@ class Contact:
     def _numbers(self, name: str, value: npt.ArrayLike) -> Array:
         with suppress(TypeError, ValueError):  # rows of different lengths, None among them
             given = np.asarray(value)
-            if given.dtype.kind in "biufO":
+            if given.dtype.kind in "biufO" and not masked(value):
                 return given.astype(float)
         what, where = f"law parameter '{name}' is no number", f"contact '{self.name}'"
         raise InputError(what, where, shortened(repr(value)), "real numbers", "give one number, or one per pair")
@@ -235,6 +236,12 @@ def contact_list(given: Iterable[Contact]) -> list[Contact]:
     if isinstance(given, Contact) or len(contacts) < len(members):
         expected, fix = "a list of fretwave.Contact", "write `contacts=[contact]`, or leave it out"
         raise InputError("contacts of a model are no list of contacts", "contacts", repr(given), expected, fix)
+    names = [one.name for one in contacts]
+    if len(set(names)) < len(names) or not all(isinstance(name, str) for name in names):
+        fix = "give each its own: fretwave.Contact(..., name=...)"
+        raise InputError(
+            "two contacts have one name, or one has none", "contacts", names, "a text each, all others", fix
+        )
     return contacts
 
 

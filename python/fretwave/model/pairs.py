@@ -11,6 +11,8 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..arrays import Array
+from ..errors import InputError
+from ..given import whole
 from .sectors import Parts, Term, around, by_sector, combine, real_csr
 
 #: A law's parameters: a number, or one per pair.
@@ -58,6 +60,13 @@ class Pairs:
     positions: Optional[Array] = None
     nodes: Optional[npt.NDArray[np.int64]] = None
     clearance: Optional[Array] = None
+
+    def __post_init__(self) -> None:
+        rows = whole(self.components) or 0
+        if rows < 1:
+            measured, fix = repr(self.components), "count the rows of B that are of one pair"
+            raise InputError("contact pairs have no such number of components", None, measured, "1, 2 or 3", fix)
+        self.components = rows
 
     def __repr__(self) -> str:
         return f"Pairs({self.n_pairs} pairs of {self.components}, {', '.join(self.parameters)})"

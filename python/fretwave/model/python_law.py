@@ -108,12 +108,21 @@ class PythonLaw:
 
     def _evaluate(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
         """What the compiled core calls for the force."""
+        u, v = _read_only(u), _read_only(v)
         f, (df_du, df_dv) = self.force(u, v), self.tangent(u, v)
         return _contiguous(f), _contiguous(df_du, OF_TANGENTS), _contiguous(df_dv, OF_TANGENTS)
 
     def _states(self, u: Array, v: Array, f: Array) -> tuple[Array, Array]:
         """What it calls for status and gap."""
+        u, v, f = _read_only(u), _read_only(v), _read_only(f)
         return _contiguous(self.status(u, v, f)), _contiguous(self.gap(u, v, f))
+
+
+def _read_only(values: Array) -> Array:
+    """A view: what a law changed in place would be another motion to all that is asked after."""
+    view = values.view()
+    view.flags.writeable = False
+    return view
 
 
 def _contiguous(values: npt.ArrayLike, rounding: float = ROUNDING) -> Array:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..errors import InputError
-from ..given import whole
+from ..given import masked, whole
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -57,9 +57,9 @@ def _dense(given: npt.ArrayLike, where: str | None) -> npt.NDArray[Any]:
         array = array.astype(float) if array.dtype.kind == "O" else array
     except (TypeError, ValueError):  # rows of different lengths, None among them
         array = np.asarray(type(given).__name__)
-    masked = isinstance(given, np.ma.MaskedArray) and bool(np.any(given.mask))
-    if array.dtype.kind not in "biufc" or array.ndim > 2 or masked:
-        kind = "entries are masked" if masked else f"{array.ndim} dimensions of {array.dtype}"
+    hidden = masked(given)
+    if array.dtype.kind not in "biufc" or array.ndim > 2 or hidden:
+        kind = "entries are masked" if hidden else f"{array.ndim} dimensions of {array.dtype}"
         measured = f"{type(given).__name__}: {kind}" if array.dtype.kind != "U" or array.ndim else str(array)
         expected, fix = "rows of real numbers, all as long, or a sparse matrix", "give a NumPy array (n, m)"
         raise InputError("this is no matrix", where, measured, expected, fix)
