@@ -14,6 +14,7 @@ from tolerances import LAST_DIGITS
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors
 from fretwave.results.reader import Run
+from fretwave.run import left_out
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -63,6 +64,17 @@ cycles = 0.1
 coefficient = 1e-13
 cycle_unit = 1e6
 """
+
+
+@pytest.mark.parametrize("wheel", ["", "wheel = true\n"])
+def test_volumes_are_said_to_be_of_one_sector(wheel: str, tmp_path: Path) -> None:
+    """Also where the mode is of the whole wheel: nothing told that its wear is not."""
+    shutil.copy(built_sector.__file__, tmp_path / "model.py")
+    (tmp_path / "case.toml").write_text(CASE.replace("nodal_diameter = 1\n", f"nodal_diameter = 1\n{wheel}"))
+    case = load_case(tmp_path / "case.toml")
+    mode, wear = (left_out._of_an_analysis(case, case.analyses[name]) for name in ("mode", "wear"))
+    assert "5 of 6 sectors" in wear[0] and "worn volumes are of one" in wear[0]
+    assert not wheel or not mode
 
 
 @pytest.fixture(scope="module")

@@ -42,9 +42,9 @@ def _of_an_analysis(case: Case, analysis: AnalysisSection) -> list[str]:
     harmonic, found = analysis.settings(case).harmonic(), []
     if harmonic is None:
         return []
-    if case.neighbours is not None and not harmonic.wheel:
-        others = case.neighbours.sectors - 1
-        found.append(f"{others} of {others + 1} sectors (a wave moves them as this one, each a phase later)")
+    if case.neighbours is not None and (analysis.wears or not harmonic.wheel):
+        others, of_one = case.neighbours.sectors - 1, ": work and worn volumes are of one" if analysis.wears else ""
+        found.append(f"{others} of {others + 1} sectors (a wave moves them as this one, each a phase later{of_one})")
     if not harmonic.errors:
         found.append("errors of the points (errors = false)")
     return found
