@@ -8,7 +8,6 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
-from ..given import numbers
 from .hermite import between, derivatives, piece, slopes
 
 if TYPE_CHECKING:
@@ -74,11 +73,11 @@ class Unknowns:
 
     def vector(self, place: float) -> PETSc.Vec:
         """Unknowns at a place. Collective."""
-        place = float(numbers("place", place))
-        if not 0 <= place <= len(self.y) - 1:
+        given = np.asarray(place).item() if np.size(place) == 1 and not np.ndim(place) else None
+        if not (isinstance(given, (int, float)) and 0 <= given <= len(self.y) - 1):
             expected, fix = f"0 to {len(self.y) - 1}", "take a row's number, or a place that `at` gives"
-            raise InputError("the branch has no such place", None, place, expected, fix)
-        i, x = piece(place, len(self.y))
+            raise InputError("the branch has no such place", None, repr(place), expected, fix)
+        i, x = piece(float(given), len(self.y))
         values = self.y[i]
         if x > 0:
             y0, t0, y1, t1 = self.y[i], self.tangents[i], self.y[i + 1], self.tangents[i + 1]
