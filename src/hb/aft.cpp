@@ -60,7 +60,7 @@ void Aft::force(double const* U, Exponents const& e, double* F) {
   transform_.to_harmonics(f_.data(), F);
 }
 
-std::uint64_t Aft::piece() const { return continuous_ ? continuous_->piece() : 0; }
+std::uint64_t Aft::piece(bool finely) const { return continuous_ ? continuous_->piece(finely) : 0; }
 
 void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;

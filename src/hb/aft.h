@@ -57,7 +57,7 @@ class Aft {
   void blocks(Exponents const&, double* D);
 
   /// Number of the smooth piece that the last force lies on.
-  std::uint64_t piece() const;
+  std::uint64_t piece(bool finely) const;
 
   ContactSummary summarise(double const* U, Exponents const&);
   ContactPeriod period(double const* U, Exponents const&) const;

@@ -22,10 +22,15 @@ double CircularContact::unclosed() const {
 }
 
 /// By how often a pair opens. Slip turns within its piece, and of hundreds of pairs one begins to slip at
-/// every step: what that bends is no corner to be walked to.
-std::uint64_t CircularContact::piece() const {
+/// every step: what that bends is no corner to be walked to. Seen finely it is one: a slider that opposite
+/// discs hold lies in a corner of the lens they have in common, and that closes as the root of the distance
+/// to where it begins to go round.
+std::uint64_t CircularContact::piece(bool finely) const {
   std::uint64_t sum = 0;
-  for (size_t k = 0; k < pairs_.size(); ++k) sum += scrambled(scrambled(k) + pairs_[k].normal.sequence());
+  for (size_t k = 0; k < pairs_.size(); ++k) {
+    const bool round = finely && pairs_[k].slider.kind == SliderPeriod::Kind::cycles;
+    sum += scrambled(scrambled(2 * k + round) + pairs_[k].normal.sequence());
+  }
   return sum;
 }
 

@@ -14,7 +14,7 @@ class ContinuousContact : public DisplacementForce {
 
   void force(double const* U, double const* V, double* F) override;
   double mean_stiffness(int pair, int component) const override;
-  std::uint64_t piece() const override;
+  std::uint64_t piece(bool finely) const override;
   void sample(int samples, double const* u, double const* v, double* f) const override;
   void measure(contact::Diagnosis&, double omega) const override;
 

@@ -51,7 +51,7 @@ double ContinuousContact::mean_stiffness(int number, int component) const {
 }
 
 /// By the states that follow each other in the period, wherever it begins.
-std::uint64_t ContinuousContact::piece() const {
+std::uint64_t ContinuousContact::piece(bool) const {
   std::uint64_t sum = 0;
   for (size_t k = 0; k < pairs_.size(); ++k) {
     Pair const& pair = pairs_[k];

@@ -22,8 +22,9 @@ class ContinuousForce {
   virtual void gap_product(double const* dgap, double* dF) = 0;
   /// Of the last force over the period: the share of contact or stick, times its stiffness.
   virtual double mean_stiffness(int pair, int component) const = 0;
-  /// Number of the sequences of states, whenever they begin: it changes where a piece comes or goes.
-  virtual std::uint64_t piece() const = 0;
+  /// Number of the sequences of states, whenever they begin: it changes where a piece comes or goes
+  /// (`finely`: one of many pairs too).
+  virtual std::uint64_t piece(bool finely) const = 0;
   /// f (samples x components x pairs) of the last force at the samples u and v.
   virtual void sample(int samples, double const* u, double const* v, double* f) const = 0;
   /// Largest |w(T) - w(0)| of a slider in that period [length].

@@ -158,9 +158,9 @@ double HarmonicProblem::rounding(Vec y) {
   return residual_.rounding() / (stiffness_ * motion_.amplitude);
 }
 
-std::uint64_t HarmonicProblem::piece(Vec y) {
+std::uint64_t HarmonicProblem::piece(Vec y, bool finely) {
   linearise(y);
-  return residual_.piece();
+  return residual_.piece(finely);
 }
 
 bool HarmonicProblem::measure_in(double k) { return std::exchange(stiffness_, k) != k; }

@@ -40,7 +40,7 @@ class HarmonicProblem : public solve::Problem {
   /// Costs nothing at the point of linearisation.
   void residual(Vec y, Vec r) override;
   double rounding(Vec y) override;
-  std::uint64_t piece(Vec y) override;
+  std::uint64_t piece(Vec y, bool finely = false) override;
   void product(Vec y, Vec dy, Vec dr) override;
   void transposed_product(Vec y, Vec dr, Vec dy) override;
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) override;

@@ -91,7 +91,7 @@ class Residual {
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
   /// Number of the smooth piece that the last evaluated point lies on, the same on every rank. Collective.
-  std::uint64_t piece() const;
+  std::uint64_t piece(bool finely) const;
   /// Grows with every `settle` and `wear` of any problem that shares the laws; the same on every rank.
   unsigned contact_version() const;
   /// The laws take the mean relative displacement of Q as their rest state, reached from sliders that stand

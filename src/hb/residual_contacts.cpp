@@ -97,9 +97,9 @@ ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
   return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], largest[0], largest[1]};
 }
 
-std::uint64_t Residual::piece() const {
+std::uint64_t Residual::piece(bool finely) const {
   std::uint64_t sum = 0;
-  for (size_t g = 0; g < groups_.size(); ++g) sum += scrambled(groups_[g].aft.piece() + g);
+  for (size_t g = 0; g < groups_.size(); ++g) sum += scrambled(groups_[g].aft.piece(finely) + g);
   sum = scrambled(sum + std::uint64_t(comm_rank(model_.comm())));
   MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, model_.comm());
   return sum;

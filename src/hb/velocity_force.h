@@ -20,7 +20,7 @@ class VelocityForce : public ContinuousForce {
   /// Mean of df/dv, times the ratio of velocity and displacement.
   double mean_stiffness(int pair, int component) const override;
   /// It is smooth.
-  std::uint64_t piece() const override { return 0; }
+  std::uint64_t piece(bool) const override { return 0; }
   void sample(int samples, double const* u, double const* v, double* f) const override;
   void measure(contact::Diagnosis&, double omega) const override;
 

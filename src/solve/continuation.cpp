@@ -165,6 +165,16 @@ std::optional<Continuation::Trial> Continuation::turn_next_corner(double& length
   return turned(turn_corner(*end, std::min<double>(length, kink_length), true), length);
 }
 
+/// The same of pieces seen finely, which are too many to be walked one by one.
+std::optional<Continuation::Trial> Continuation::turn_fine_corner(double& length) {
+  double nearer = length;
+  finely_ = true;
+  auto behind = turn_next_corner(nearer);
+  finely_ = false;
+  if (behind) length = nearer;
+  return behind;
+}
+
 std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> behind, double& length) {
   turned_ = bool(behind);
   if (turned_) length = distance(behind->y, anchor_.y);
@@ -175,7 +185,7 @@ std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> beh
 /// by one; else a corner is looked for where no shorter step leads on.
 std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, Failure& failure) {
   const bool may_shorten = length > std::max<double>(kink_length, 16 * steps_.minimum);
-  turned_ = false;
+  turned_ = finely_ = false;
   adrift_.clear();
   if (wary)
     if (auto behind = turn_next_corner(length)) return behind;
@@ -197,6 +207,7 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
   if (may_shorten) return {};
   if (!wary)
     if (auto behind = turn_next_corner(length)) return behind;
+  if (auto behind = turn_fine_corner(length)) return behind;
   return turned(turn_corner(length, length, false), length);  // one that no piece's number tells of
 }
 

@@ -109,6 +109,7 @@ class Continuation {
   double distance(Vec a, Vec b) const;
   std::string complaint(Trial&, double length, bool may_shorten);
   std::optional<Trial> turn_next_corner(double& length);
+  std::optional<Trial> turn_fine_corner(double& length);
   std::optional<Trial> turned(std::optional<Trial> behind, double& length);
   std::optional<Trial> attempt(double& length, bool wary, Failure&);
   double next_step(Trial const&, double length, double intended);
@@ -139,6 +140,7 @@ class Continuation {
   int orientation(Vec y, Vec tangent);
   bool beyond_corner(Trial const&) const;
   bool leads_back(Trial&);
+  std::uint64_t piece(Vec y) { return problem_.piece(y, finely_); }
   bool on_piece(std::uint64_t here, double at);
   bool corner_within(double reach, double& soft);
   double piece_end(std::uint64_t here, double reach, double share);
@@ -188,8 +190,8 @@ class Continuation {
   std::vector<std::string> missed_;
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, circles_ = 0, crawled_ = 0;
-  bool way_ = false, upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false, finished_ = false,
-       converged_ = false;
+  bool way_ = false, upwards_ = true, taken_over_ = false, turned_ = false, finely_ = false, wary_ = false,
+       finished_ = false, converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
   std::string reason_;

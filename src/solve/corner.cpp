@@ -9,13 +9,14 @@
 /// more than a right one, where no plane across the old tangent meets it again.
 ///
 /// Which way it goes on is seen from where things are: a solution behind the corner lies on the branch, which
-/// comes to it from there; just behind a facet one way along the new piece leads into it, the other out
-/// again. Where that does not tell: the tangent t spans the null space of J, and det [J; t^T] has one sign on
-/// all pieces (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, section 14: det [J_B;
-/// n^T] = det [J_A; n^T], so that n . t_A and n . t_B agree). A single facet, and several passed at once by
+/// comes to it from there. Else the tangent t spans the null space of J, and det [J; t^T] has one sign on all
+/// pieces (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, section 14: det [J_B; n^T]
+/// = det [J_A; n^T], so that n . t_A and n . t_B agree). A single facet, and several passed at once by
 /// symmetry, have J_B t_A = c (n . t_A) and -J_A t_B = c (n . t_B): the right t_B is the one for which these
-/// two point the same way. Where different ones lie between, the determinant itself is asked, of systems that
-/// are small enough. It deceives at a branch point, and where pieces are passed that nothing shows.
+/// two point the same way. Where different ones lie between, one way along the new piece leads into it, the
+/// other soon out again (not so between facets that are curved and lie side by side), or the determinant
+/// itself is asked, of systems that are small enough. It deceives at a branch point, and where pieces are
+/// passed that nothing shows.
 namespace fretwave::solve {
 
 namespace {
@@ -131,7 +132,7 @@ bool Continuation::leads_back(Trial& trial) {
 
 /// Whether the tangent lies on this piece at a distance from the anchor. Collective.
 bool Continuation::on_piece(std::uint64_t here, double at) {
-  return problem_.piece(moved(anchor_.y, at, anchor_.tangent)) == here;
+  return piece(moved(anchor_.y, at, anchor_.tangent)) == here;
 }
 
 /// Just beyond the end of this piece along the tangent, to a share of it, where `reach` is beyond.
@@ -147,7 +148,7 @@ double Continuation::piece_end(std::uint64_t here, double reach, double share) {
 /// Just beyond the end of the present piece along the tangent, if it ends within `reach`. Collective.
 std::optional<double> Continuation::facet(double reach) {
   constexpr double precise = 1e-6;
-  const auto here = problem_.piece(anchor_.y);
+  const auto here = piece(anchor_.y);
   if (on_piece(here, reach)) return {};
   return piece_end(here, reach, precise);
 }
@@ -157,7 +158,7 @@ std::optional<double> Continuation::facet(double reach) {
 /// walked to. `soft` gets the place then. Of several ends one is judged; shorter steps come to the others.
 /// Collective.
 bool Continuation::corner_within(double reach, double& soft) {
-  const auto here = problem_.piece(anchor_.y);
+  const auto here = piece(anchor_.y);
   if (on_piece(here, reach) || !on_piece(here, sparse * reach)) return false;
   const double end = piece_end(here, reach, about / 2);
   newton_.scale(anchor_.y);  // the attempt was measured in its own forces
@@ -180,16 +181,20 @@ bool Continuation::fits(Vec y) {
 
 /// How far, at most `reach`, a tangent leads from y within one piece, halved so that it ends well inside.
 double Continuation::within_piece(Vec y, Vec tangent, double reach) {
-  const auto here = problem_.piece(y);
-  if (problem_.piece(moved(y, reach, tangent)) == here) return reach;
+  const auto here = piece(y);
+  if (piece(moved(y, reach, tangent)) == here) return reach;
   for (int k = 0; k < halvings; ++k, reach /= 2)
-    if (problem_.piece(moved(y, reach, tangent)) == here) break;
+    if (piece(moved(y, reach, tangent)) == here) break;
   return reach / 2;
 }
 
 /// +1: `tangent` leads on into the piece that begins just before y, -1: back out of it; 0: it cannot be told,
-/// as where pieces are shorter than `reach`.
+/// as where pieces are shorter than `reach`, or need not be: a single facet's products say it.
 int Continuation::into_piece(Vec y, Vec tangent, double reach) {
+  const double cosine = along_facet(y, tangent);
+  if (std::abs(cosine) >= surely_one ||
+      (std::abs(cosine) >= one_facet && orientation(y, tangent) * cosine > 0))
+    return 0;
   const VecHandle back = copy(tangent);
   check(VecScale(back, -1));
   const double ahead = within_piece(y, tangent, reach), behind = within_piece(y, back, reach);
@@ -210,7 +215,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   if (!std::isfinite(size)) return {};
   check(VecScale(tangent, 1 / size));
   const bool straight = dot(row_, tangent) > 1 - no_corner && fits(there);
-  if (straight && on_piece(problem_.piece(anchor_.y), beyond)) return {};
+  if (straight && on_piece(piece(anchor_.y), beyond)) return {};
   const int placed = straight ? 1 : seen ? into_piece(there, tangent, reach) : 0;
   const int sign = placed ? placed : orientation(there, tangent);
   if (sign == 0) return {};

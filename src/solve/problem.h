@@ -41,8 +41,9 @@ class Problem {
   virtual void residual(Vec y, Vec r) = 0;
   /// Rounding error to expect in r(y): Newton stops there. Collective.
   virtual double rounding(Vec /*y*/) { return 0; }
-  /// Number of the smooth piece of the equations that y lies on: another one beyond a kink. Collective.
-  virtual std::uint64_t piece(Vec /*y*/) { return 0; }
+  /// Number of the smooth piece of the equations that y lies on: another one beyond a kink, of those too that
+  /// are many and hardly bend the branch if `finely`. Collective.
+  virtual std::uint64_t piece(Vec /*y*/, bool /*finely*/ = false) { return 0; }
   /// Measures the rows in the forces that act at y from now on; true if that changed them. Collective.
   virtual bool scale(Vec /*y*/) { return false; }
   /// Relative change of what is read from y by a small step dy; 0 if nothing is known. Collective.

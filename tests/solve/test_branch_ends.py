@@ -159,8 +159,8 @@ def test_a_stop_value_within_a_corner_is_an_end(comm):
     pad = {**stiff, "friction_coefficient": 0.013638073087847874, "normal_load": 58.46723536602342, "gap": 0.0}
     rub = {"friction_limit": 293.60260822536407, "regularisation_velocity": 0.04479277398266465}
     contacts = [
-        fw.Contact("coulomb_3d", np.eye(3), pad),
-        fw.Contact("regularised_coulomb", np.array([[0.0, 1.0, -1.0]]), rub),
+        fw.Contact("coulomb_3d", np.eye(3), pad, "pad"),
+        fw.Contact("regularised_coulomb", np.array([[0.0, 1.0, -1.0]]), rub, "rub"),
     ]
     with fw.Model(M, K, None, contacts, comm) as model:
         first = fw.linear_modes(model, 1, "stuck")[0]

@@ -1,0 +1,68 @@
+"""Responses of masses on pads and stops at random: no corner turns one round, none is too sharp to be passed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fretwave as fw
+
+SLIDER = ("jenkins", {"tangential_stiffness": (1, 10), "friction_limit": (0.1, 1)})
+STOP = ("unilateral_spring", {"normal_stiffness": (2, 20), "gap": (0, 0.3)})
+
+
+def response(comm, seed, pads, beside, static):
+    """Of four masses between springs, and the frequency [rad/s] of their first mode with the pad stuck."""
+    draw = np.random.default_rng(seed)
+    root = draw.normal(size=(4, 4))
+    K, rows = root @ root.T + np.eye(4), np.eye(4)
+    pad = {
+        "normal_stiffness": draw.uniform(2, 20),
+        "tangential_stiffness": draw.uniform(1, 10),
+        "friction_coefficient": draw.uniform(0.2, 0.9),
+        "normal_load": draw.uniform(0.5, 3),
+        "gap": 0.0,
+    }
+    contacts = [fw.Contact(pads, rows[draw.permutation(4)[:3]], pad, "pad")]
+    law, bounds = beside
+    place = rows[draw.permutation(4)[:1]]
+    contacts.append(fw.Contact(law, place, {name: draw.uniform(*ends) for name, ends in bounds.items()}, law))
+    model = fw.Model(np.eye(4), K, 0.02 * K, contacts, comm)
+    mean, harmonic = static * draw.normal(size=4), draw.normal(size=4) + 1j * draw.normal(size=4)
+    stuck, rest = fw.linear_modes(model, 1)[0], fw.balanced(model)
+    force = {0: mean, 1: (2 if law == "jenkins" else 1) * harmonic}
+    harmonics = fw.Harmonics(range(6), 128)
+    return fw.ForcedResponse(model, harmonics, force=force, level=1.0, dof=0, reference=stuck, rest=rest), stuck.omega
+
+
+def followed(comm, seed, pads, beside, static, **steps):
+    problem, omega = response(comm, seed, pads, beside, static)
+    ends = (0.5 * omega, 1.6 * omega)
+    first, last = ends if seed % 2 else ends[::-1]
+    return fw.follow(problem, first, last, errors=False, steps=fw.StepControl(**steps))
+
+
+def told(branch):
+    """Largest amplitude, and how many folds."""
+    assert branch.converged, branch.reason
+    return branch["amplitude"].max(), sum(event == "fold" for event, _ in branch.events)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("seed", [9, 44, 106, 213])
+def test_facets_side_by_side_do_not_turn_a_branch_round(comm, seed):
+    """Between curved facets a piece is left at once the right way: 13 of 400 turned back onto themselves."""
+    scene = (seed, "coulomb_3d_uncoupled", SLIDER, 1.0)
+    amplitude, folds = told(followed(comm, *scene))
+    finely, same = told(followed(comm, *scene, initial=0.02, maximum=0.04))
+    assert amplitude == pytest.approx(finely, rel=1e-9) and folds == same
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("seed", [41, 82])
+def test_a_slider_that_opposite_discs_begin_to_hold_ends_no_branch(comm, seed):
+    """The lens they have in common opens as the root of the distance: Newton's method went to and fro across it."""
+    scene = (seed, "coulomb_3d", STOP, 2.0)
+    amplitude, folds = told(followed(comm, *scene))
+    finely, same = told(followed(comm, *scene, initial=0.02, maximum=0.04))
+    assert amplitude == pytest.approx(finely, rel=1e-9) and folds == same
