@@ -168,23 +168,18 @@ def branch_cost(model: Any, dof: int, first: Any, rest: Any, highest: int, optio
 
 
 def followed(problem: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
-    """Points of the branch with the processor time of each."""
+    """Points of the branch with the time of each."""
     steps = fw.StepControl(initial=0.1, max_points=options.points)
     branch = fw.Continuation(problem, problem.initial(options.start), (options.start, 100 * options.start), steps)
     rows: list[dict[str, Any]] = []
-    points = iter(branch)
-    while True:
-        began = time.process_time()
-        p = next(points, None)
-        seconds = time.process_time() - began
-        if p is None:
-            return rows
+    for p in branch:
         names = ("parameter", "event", "newton", "linear", "residual")
-        row = {**{name: getattr(p, name) for name in names}, **problem.diagnostics(p.y), "seconds": seconds}
+        row = {**{name: getattr(p, name) for name in names}, **problem.diagnostics(p.y), "seconds": p.wall_s}
         rows.append(row)
         if options.verbose:
             print("   a {parameter:.3e} slip {slip:.3f} open {open:.3f} newton {newton} GMRES {linear} "
                   "{seconds:.3f} s {event}".format(**row))  # fmt: skip
+    return rows
 
 
 def report_shares(highest: int, options: argparse.Namespace) -> None:
