@@ -62,6 +62,14 @@ void Aft::force(double const* U, Exponents const& e, double* F) {
 
 std::uint64_t Aft::piece(bool finely) const { return continuous_ ? continuous_->piece(finely) : 0; }
 
+std::uint64_t Aft::piece_of(double const* U, Exponents const& e, bool finely) {
+  if (columns_ == 0 || !continuous_) return 0;
+  if (const auto known = continuous_->piece_of(U, finely)) return *known;
+  std::vector<double> F(size_t(columns_) * harmonics_.block_size());
+  force(U, e, F.data());
+  return piece(finely);
+}
+
 void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;
   if (continuous_) return continuous_->product(dU, dV, dF);

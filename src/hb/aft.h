@@ -58,6 +58,8 @@ class Aft {
 
   /// Number of the smooth piece that the last force lies on.
   std::uint64_t piece(bool finely) const;
+  /// That of U, in less time where it needs no force.
+  std::uint64_t piece_of(double const* U, Exponents const&, bool finely);
 
   ContactSummary summarise(double const* U, Exponents const&);
   ContactPeriod period(double const* U, Exponents const&) const;

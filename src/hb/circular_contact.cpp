@@ -43,7 +43,7 @@ void CircularContact::force(double const* U, double const*, double* F) {
       continue;
     }
     pair.law = law_.linear_pair(int(k));
-    take(U, pair);
+    take(U, pair.law, pair.normal);
     find(U, pair);
     std::fill_n(F, size(), 0.0);
     pair.normal.add_force(harmonics_, F);
@@ -51,17 +51,16 @@ void CircularContact::force(double const* U, double const*, double* F) {
   }
 }
 
-/// Its motion, and when it is closed.
-void CircularContact::take(double const* U, Pair& pair) {
-  pair.normal.take(harmonics_, pair.law, U);
-  Series const& approach = pair.normal.approach;
-  pair.normal.spans.clear(), pair.normal.closed = approach.q[0].real() > approach.bound();
-  if (pair.normal.closed) return;
+/// A pair's motion, and when it is closed.
+void CircularContact::take(double const* U, contact::LinearPair const& law, NormalContact& normal) const {
+  normal.take(harmonics_, law, U);
+  Series const& approach = normal.approach;
+  normal.spans.clear(), normal.closed = approach.q[0].real() > approach.bound();
+  if (normal.closed) return;
   std::vector<double> values(times_);
   evaluate(search_, harmonics_.block_size(), U, values.data());
-  const double interference = pair.law.interference();
-  for (double& value : values) value += interference;
-  pair.normal.find_spans(values.data(), times_);
+  for (double& value : values) value += law.interference();
+  normal.find_spans(values.data(), times_);
 }
 
 /// Its slider, closed over the period.

@@ -15,6 +15,7 @@ class CircularContact : public DisplacementForce {
   void force(double const* U, double const* V, double* F) override;
   double mean_stiffness(int pair, int component) const override;
   std::uint64_t piece(bool finely) const override;
+  std::optional<std::uint64_t> piece_of(double const* U, bool finely) const override;
   void sample(int samples, double const* u, double const* v, double* f) const override;
   void measure(contact::Diagnosis&, double omega) const override;
   double unclosed() const override;
@@ -28,7 +29,7 @@ class CircularContact : public DisplacementForce {
     SliderPeriod slider;
   };
   size_t size() const { return 3 * size_t(harmonics_.block_size()); }
-  void take(double const* U, Pair&);
+  void take(double const* U, contact::LinearPair const&, NormalContact&) const;
   void find(double const* U, Pair&);
   void take_nodes(double const* U, Pair&);
   void add_friction(Pair const&, double* F) const;

@@ -25,6 +25,8 @@ class ContinuousForce {
   /// Number of the sequences of states, whenever they begin: it changes where a piece comes or goes
   /// (`finely`: one of many pairs too).
   virtual std::uint64_t piece(bool finely) const = 0;
+  /// That of U, where it is had without its force; the last one stays as it is.
+  virtual std::optional<std::uint64_t> piece_of(double const* /*U*/, bool /*finely*/) const { return {}; }
   /// f (samples x components x pairs) of the last force at the samples u and v.
   virtual void sample(int samples, double const* u, double const* v, double* f) const = 0;
   /// Largest |w(T) - w(0)| of a slider in that period [length].

@@ -92,6 +92,8 @@ class Residual {
   ContactSummary summarise(Vec Q, Exponents const& e);
   /// Number of the smooth piece that the last evaluated point lies on, the same on every rank. Collective.
   std::uint64_t piece(bool finely) const;
+  /// That of another point, after which none is evaluated. Collective.
+  std::uint64_t piece_of(Vec Q, Exponents const& e, bool finely);
   /// Grows with every `settle` and `wear` of any problem that shares the laws; the same on every rank.
   unsigned contact_version() const;
   /// The laws take the mean relative displacement of Q as their rest state, reached from sliders that stand
@@ -128,6 +130,7 @@ class Residual {
     void each_couple(Body body) const;
   };
   void expect_depths(PerContact const& depth) const;
+  std::uint64_t of_all_ranks(std::uint64_t piece) const;
   void gaps_product(PerContact const& dgap, Vec dR);
   Map make_map(Mat B, int phase) const;
   void relative_motion(Group const&, Vec Q, Vec U) const;

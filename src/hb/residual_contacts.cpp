@@ -100,9 +100,25 @@ ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
 std::uint64_t Residual::piece(bool finely) const {
   std::uint64_t sum = 0;
   for (size_t g = 0; g < groups_.size(); ++g) sum += scrambled(groups_[g].aft.piece(finely) + g);
-  sum = scrambled(sum + std::uint64_t(comm_rank(model_.comm())));
-  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, model_.comm());
-  return sum;
+  return of_all_ranks(sum);
+}
+
+std::uint64_t Residual::piece_of(Vec Q, Exponents const& e, bool finely) {
+  static const log::Event forces("FwContactForce");
+  std::uint64_t sum = 0;
+  const auto U = relative_motions(Q);
+  const log::Span span(forces);
+  together(model_.comm(), "states of contacts", [&] {
+    for (size_t g = 0; g < groups_.size(); ++g)
+      sum += scrambled(groups_[g].aft.piece_of(ReadArray(U[g]).data(), e, finely) + g);
+  });
+  return of_all_ranks(sum);
+}
+
+std::uint64_t Residual::of_all_ranks(std::uint64_t piece) const {
+  piece = scrambled(piece + std::uint64_t(comm_rank(model_.comm())));
+  MPI_Allreduce(MPI_IN_PLACE, &piece, 1, MPI_UINT64_T, MPI_SUM, model_.comm());
+  return piece;
 }
 
 unsigned Residual::contact_version() const {

@@ -21,6 +21,7 @@ class VelocityForce : public ContinuousForce {
   double mean_stiffness(int pair, int component) const override;
   /// It is smooth.
   std::uint64_t piece(bool) const override { return 0; }
+  std::optional<std::uint64_t> piece_of(double const*, bool) const override { return 0; }
   void sample(int samples, double const* u, double const* v, double* f) const override;
   void measure(contact::Diagnosis&, double omega) const override;
 

@@ -66,3 +66,18 @@ def test_a_slider_that_opposite_discs_begin_to_hold_ends_no_branch(comm, seed):
     amplitude, folds = told(followed(comm, *scene))
     finely, same = told(followed(comm, *scene, initial=0.02, maximum=0.04))
     assert amplitude == pytest.approx(finely, rel=1e-9) and folds == same
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("pads", ["coulomb_3d", "coulomb_3d_uncoupled"])
+def test_a_piece_has_one_number_with_a_force_and_without(comm, pads):
+    """Where a residual was asked for it is read from that; elsewhere no slider is marched. The residual stays right."""
+    problem, omega = response(comm, 9, pads, STOP, 1.0)
+    branch = fw.follow(problem, 0.5 * omega, 1.6 * omega, errors=False)
+    rows = [branch.unknowns(row) for row in range(0, len(branch), 20)]
+    alone = [problem.core.piece(y) for y in rows]
+    r = problem.core.unknowns()
+    for y, number in zip(rows, alone):
+        problem.core.residual(y, r)
+        assert r.norm() < 1e-8 and problem.core.piece(y) == number
+    assert len(set(alone)) > 2
