@@ -32,7 +32,7 @@ constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the 
 constexpr double no_force = 1e-3;        // of a tangent on the other piece, in forces that act
 constexpr int halvings = 60;
 
-const Tuned quick("branch_quick", 300,
+const Tuned quick("branch_quick", 500,
                   "unknowns, at most 1000, up to which each step asks a determinant which way it leads");
 const Tuned surely_in("branch_surely_in", 100,
                       "times as far within a piece one way as the other: it begins here");

@@ -46,6 +46,19 @@ def test_raising_the_excitation_leads_to_the_response(comm):
 
 
 @pytest.mark.ranks(1)
+def test_a_solution_that_is_given_is_where_a_branch_begins(comm):
+    """However far from the linear mode: looked for from small amplitudes it was another one's, or found at a cost."""
+    slider = fw.Contact("jenkins", [[1.0]], {"tangential_stiffness": 1.0, "friction_limit": 0.3})
+    problem = mode_problem(single_dof(comm, law=slider), [1, 3, 5], 128, start="stuck")
+    *_, last = fw.Continuation(problem, problem.initial(0.1), (0.1, 3.0))
+    branch = fw.Continuation(problem, last.y, (0.5, 4.0), upwards=True)
+    first = next(iter(branch))
+    assert abs(problem.state(last.y)["omega0"] / problem.start.omega - 1) > 0.1
+    assert branch.started == ""
+    assert problem.state(first.y)["zeta"] == pytest.approx(problem.state(last.y)["zeta"], rel=REPEATED)
+
+
+@pytest.mark.ranks(1)
 def test_a_response_at_a_stiff_stop_starts_by_closing_its_gap(comm):
     """Its equations are the same at every level: raising the excitation leads nowhere."""
     problem, branch = response(stop(comm, 1e4), 1.0, (0.9, 0.91), range(8), 128)

@@ -15,7 +15,7 @@ from ..given import with_a_square
 from ..hb.harmonic_problem import HarmonicProblem
 from ..mpi.log import event
 from ..mpi.spread import Cuttable, Spread, fill
-from .starting import far_from_start, starts
+from .starting import far_from_start, given, starts
 from .steps import StepControl
 from .trace import Knot
 
@@ -130,7 +130,7 @@ class Continuation:
         point = self._core.start(self._y0, self._upwards)
         if self.way:
             return dict(point) if point is not None else None
-        far = point is not None and far_from_start(self.problem, point["y"])
+        far = point is not None and not given(self._y0, point["y"]) and far_from_start(self.problem, point["y"])
         if point is not None and not far:
             return dict(point)
         reason = "the first point found is far from the linear mode" if far else str(self._core.reason)

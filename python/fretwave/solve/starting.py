@@ -34,6 +34,8 @@ GROWTH = (
 )
 #: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
 FAR = 0.02
+#: Relative: a first point so near to its guess was given.
+GIVEN = 1e-6
 CLOSING = "closing the gaps from where nothing touches"
 
 
@@ -46,6 +48,14 @@ class Way(HarmonicProblem):
 
     def __init__(self, problem: HarmonicProblem, core: Start) -> None:
         super().__init__(problem.model, problem.harmonics, problem.prefix, core)
+
+
+def given(y0: PETSc.Vec, y: PETSc.Vec) -> bool:
+    """Whether a first point y is what was given as y0: a solution that the caller goes on from. Collective."""
+    step = y - y0
+    near = bool(step.norm() <= GIVEN * y0.norm())
+    step.destroy()
+    return near
 
 
 def far_from_start(problem: HarmonicProblem, y: PETSc.Vec) -> bool:
