@@ -102,27 +102,24 @@ class PythonLaw:
             moved = (u, v)[which]
             step = np.zeros_like(moved)
             step[:, column] = 6e-6 * max(float(np.abs(moved).max(initial=0.0)), 1e-12)
-            plus, minus = ((u + step, v), (u - step, v)) if which == 0 else ((u, v + step), (u, v - step))
-            columns.append((self.force(*plus) - self.force(*minus)) / (2 * step[:, column : column + 1]))
+            moves = [(u + s, v.copy()) if which == 0 else (u.copy(), v + s) for s in (step, -step)]
+            plus, minus = (np.array(self.force(*moved)) for moved in moves)
+            columns.append((plus - minus) / (2 * step[:, column : column + 1]))
         return np.stack(columns, axis=2)
 
     def _evaluate(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
         """What the compiled core calls for the force."""
-        u, v = _read_only(u), _read_only(v)
-        f, (df_du, df_dv) = self.force(u, v), self.tangent(u, v)
+        f, (df_du, df_dv) = np.array(self.force(*_copies(u, v))), self.tangent(*_copies(u, v))
         return _contiguous(f), _contiguous(df_du, OF_TANGENTS), _contiguous(df_dv, OF_TANGENTS)
 
     def _states(self, u: Array, v: Array, f: Array) -> tuple[Array, Array]:
         """What it calls for status and gap."""
-        u, v, f = _read_only(u), _read_only(v), _read_only(f)
-        return _contiguous(self.status(u, v, f)), _contiguous(self.gap(u, v, f))
+        return _contiguous(self.status(*_copies(u, v, f))), _contiguous(self.gap(*_copies(u, v, f)))
 
 
-def _read_only(values: Array) -> Array:
-    """A view: what a law changed in place would be another motion to all that is asked after."""
-    view = values.view()
-    view.flags.writeable = False
-    return view
+def _copies(*values: Array) -> list[Array]:
+    """A law may change its own in place: it would be another motion to all that is asked after."""
+    return [one.copy() for one in values]
 
 
 def _contiguous(values: npt.ArrayLike, rounding: float = ROUNDING) -> Array:
