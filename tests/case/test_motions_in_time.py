@@ -74,6 +74,13 @@ def test_a_motion_has_a_size_whose_square_is_a_number(key: str) -> None:
 @pytest.mark.parametrize("loaded, refused", [("mode", "free_decay"), ("flutter", "limit_cycle"), ("forced", "forced")])
 def test_a_preload_is_refused_wherever_it_is_given(loaded: str, refused: str) -> None:
     """An analysis' own one was not seen: its motions in time lacked the load, steady ones by 0.98 of themselves."""
-    [problem] = problems(f"{loaded}.preload={{}}")
+    [problem] = problems(f"{loaded}.preload={{balanced=false}}")
     assert problem.what.startswith(refused) and "does not know a preload" in problem.what
     assert problem.fix and (loaded == refused or f"the preload of '{loaded}'" in problem.fix)
+
+
+@pytest.mark.parametrize("loaded", ["mode", "flutter", "forced"])
+@pytest.mark.parametrize("preload", ["{}", "{loads=[]}", "{loads=[], pair_loads=true, balanced=true}"])
+def test_a_preload_without_loads_is_as_none(loaded: str, preload: str) -> None:
+    """It was refused as one that acts."""
+    assert load_case(CASE, [f"{loaded}.preload={preload}"]).acting_loads == []

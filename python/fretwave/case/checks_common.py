@@ -66,9 +66,18 @@ def check_loads(report: Reporter, section: Optional[PreloadSection], known: Sequ
 def _loaded_by(analysis: AnalysisSection, facts: Facts) -> str:
     """What gives an analysis a static state: its own key, that of the mode it starts from, the case; empty if none."""
     for name in (analysis.name, *analysis.decided_by()):
-        if given_to(facts, name, "preload") is not None:
+        if _acts(given_to(facts, name, "preload")):
             return f"the preload of '{name}'"
-    return "[preload]" if facts.preload is not None else ""
+    replaced = given_to(facts, analysis.name, "preload") is not None
+    return "[preload]" if facts.preload is not None and not replaced else ""
+
+
+def _acts(preload: object) -> bool:
+    """As it stands in the case; without loads, and pairs in balance as they are, it is as none."""
+    if not isinstance(preload, dict):
+        return preload is not None
+    as_they_are = all(preload.get(key, True) is True for key in ("pair_loads", "balanced"))
+    return bool(preload.get("loads")) or not as_they_are
 
 
 def _check_time_integration(report: Reporter, analysis: AnalysisSection, key: str, facts: Facts) -> None:
