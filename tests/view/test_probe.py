@@ -279,6 +279,17 @@ def test_a_pair_that_sticks_has_no_range_of_rounding(mean: float) -> None:
     assert slip_range(slips, np.array([7.3]))[0] == pytest.approx(2e-6, rel=1e-6)
 
 
+def test_a_slip_between_the_samples_is_not_none() -> None:
+    """All samples stick; the share of the whole period, where it is kept, knows better."""
+    u = (1e-6 * np.cos(2 * np.pi * np.arange(64) / 64))[:, None, None] * np.ones(3)
+    f = u * np.array([7.3, 7.0, 7.3])
+    shares = np.array([[1.0, 0.999, 1.0], [0.0, 0.001, 0.0], [0.0, 0.0, 0.0]])
+    for status in (np.zeros((64, 3), dtype=np.int8), None):
+        history = ContactHistory(u, 0 * u, f, status, kept_shares=shares)
+        stuck, slips, _ = slip_range(history, np.full(3, 7.3))
+        assert stuck == 0.0 and slips == pytest.approx(2e-6 * (1 - 7.0 / 7.3), rel=1e-6)
+
+
 def test_open_pairs_do_not_slip() -> None:
     """The displacement of an open pair moves no slider."""
     u, closed = np.linspace(0.0, 1.0, 5)[:, None, None], np.zeros((5, 1, 1))

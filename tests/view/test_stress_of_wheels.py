@@ -195,3 +195,22 @@ def test_the_mean_of_a_mistuned_reduced_wheel_is_told_to_be_of_tuned_sectors(tmp
         assert (told in capfd.readouterr().out) == (name == "reduced")
     one, other = (table(tmp_path / name / "driven_gauges.csv")["far_mean"][0] for name in ("reduced", "whole"))
     assert 1e-3 < abs(one / other - 1) < 0.02
+
+
+def test_all_that_nodes_lack_is_told(tmp_path: Path, capfd) -> None:
+    """The note on tuned sectors was left out beside that on a load which an earlier version has not kept."""
+    builder = Path(gauged_sector.__file__).read_text()
+    (tmp_path / "gauged_sector.py").write_text(
+        builder.replace('{"spin": radial[free]}', '{"spin": radial[free], "more": radial[free] / 2}')
+    )
+    mistuned = 'mistuning = { of = "all", deviations = [0.02, -0.01, 0.0, -0.02, 0.01] }\n'
+    response = RESPONSE.format(name="driven", wheel="true").replace("harmonics = 1\n", f"harmonics = 1\n{mistuned}")
+    (tmp_path / "case.toml").write_text(CASE + LOADED.replace('["spin"]', '["spin", "more"]') + response)
+    assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    with h5py.File(tmp_path / "run" / "reduction.h5", "r+") as file:
+        file["load"][...] = [name.replace(b"more", b"none") for name in file["load"][()]]
+    capfd.readouterr()
+    assert call("stress", tmp_path / "run") == 0
+    told = capfd.readouterr().out
+    assert "\n  note: the displacement at rest under more is that of the component modes alone" in told
+    assert "\n  note: of the displacement at rest, what no component mode has is that of the tuned sector" in told

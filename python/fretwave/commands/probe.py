@@ -111,7 +111,7 @@ def _point_line(group: h5py.Group, name: str, point: int, said: str) -> str:
 
 
 def _show_motion(moved: NodeMotion, line: str, options: argparse.Namespace) -> None:
-    said = [line, moved.note] if moved.note else [line]
+    said = [line, *moved.note.splitlines()]
     if options.steps is not None:
         _write(_period_csv(moved, options.steps), [*said, moved.what], options.out)
     elif options.csv or options.out is not None:

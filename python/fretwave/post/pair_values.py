@@ -73,10 +73,10 @@ def slip_range(history: ContactHistory, stiffness: Array | None = None) -> Array
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS if len(rows) == 2 else np.zeros(1)
     turns = np.column_stack([np.cos(angles), np.sin(angles)])[:, : len(rows)]
     found = np.max([_extent(np.einsum("c,ncp->np", turn, path)) for turn in turns], axis=0)
-    if stiffness is None or history.status is None:
+    if stiffness is None or (history.kept_shares is None and history.status is None):
         return np.asarray(found)
-    # of what sticks the rounding of u and f, which grows with the static load
-    return np.asarray(np.where((history.status == STICK).all(axis=0), 0.0, found))
+    # of what sticks the rounding of u and f, which grows with the static load; samples may miss a short slip
+    return np.asarray(np.where(history.share(STICK) == 1, 0.0, found))
 
 
 def _extent(values: Array) -> Array:

@@ -137,7 +137,8 @@ def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
     if top is not None and ("level" in columns or varies(columns["zeta"][rows])):
         yield top, "largest damping" if "zeta" in columns else f"largest amplitude{whose_amplitude(columns)}"
     for name in ("normal_force", "tangential_force") if "level" not in columns else ():
-        if name in columns and np.isfinite(columns[name][rows]).any():  # of a law without a normal direction none is
+        # of a law without a normal direction none is known, of one without friction all are zero
+        if name in columns and np.any(columns[name][rows] > 0):
             yield int(rows[largest(columns[name][rows])]), f"largest {name.replace('_', ' ')}"
     for name in ("zeta_error", "amplitude_error"):
         errors = columns.get(name, np.empty(0))

@@ -75,7 +75,7 @@ class Scene:
     around : int
         Sectors of the wheel, 1 for a structure.
     axis : of the wheel
-    note : what its nodes lack, in words; empty for nothing
+    note : what its nodes lack, in words, a line for each thing; empty for nothing
     """
 
     nodes: Array
@@ -186,7 +186,7 @@ def scene_of(
             basis = expansion_of(case, choice, folder, around, stack)
             expand, ties = basis.expand, basis.ties or ties
             beyond, missing = beyond_basis(basis, _loads(case, choice))
-            note = note or missing or of_tuned_sector(case, choice, beyond)
+            note = "\n".join(filter(None, [note, missing, of_tuned_sector(case, choice, beyond)]))
         given, shown = moving or geometry(case), _shown(case, around, sectors)
         to_dofs, to_nodes = _to_dofs(expand, beyond), _to_nodes(given, len(nodes))
         yield Scene(nodes, choice, to_dofs, to_nodes, shown, ties, around, given.axis or "z", note)

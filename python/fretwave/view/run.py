@@ -63,8 +63,8 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     for line in choice.lines(options.pvd or not options.skin):  # pictures never show contacts
         say(line)
     with scene_of(case, choice, nodes, folder, options.sectors) as scene:
-        if scene.note:
-            say(scene.note)
+        for line in scene.note.splitlines():
+            say(line)
         scale = options.scale if options.scale is not None else scene.natural_scale()
         out = folder / choice.name if options.out is None else options.out.with_name(_stem(options.out))
         files = _pictures(out, scene, cells, scale, options, say)

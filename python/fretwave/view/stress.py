@@ -192,7 +192,7 @@ def _table(file: h5py.File, folder: Path, case: Case, name: str, reader: Reader)
             {**{key: points[key][k].item() for key in lead}, **_row(reader, scene, at_point(choice, group, case, k))}
             for k in range(len(group["coefficients"]))
         ]
-        notes = [scene.note] * bool(scene.note)
+        notes = scene.note.splitlines()
         warnings: list[str] = []
         if rows and reader.own is not None:
             k = largest(_sizes(rows), EQUAL)
