@@ -184,7 +184,7 @@ def test_a_flow_has_a_frequency(omega: Any) -> None:
     assert "frequency" in refused(lambda: fw.Aerodynamics({0: 1.0}, omega))
 
 
-@pytest.mark.parametrize("ratios", [{1: 0.1, 7: 0.2}, {3: 0.1, -3: 0.2}, {-1: 0.1, 5: 0.1}], ids=str)
+@pytest.mark.parametrize("ratios", [{1: 0.1, 7: 0.2}, {3: 0.1, -3: 0.2}, {-1: 0.1, 5: 0.3}], ids=str)
 def test_a_wave_of_the_flow_has_one_ratio(ratios: dict[int, float]) -> None:
     """The last one was taken."""
     assert "one wave has two" in refused(lambda: fw.Aerodynamics.from_damping(ratios, 6, 1.0))
@@ -197,6 +197,10 @@ def test_a_wave_of_the_flow_has_one_ratio(ratios: dict[int, float]) -> None:
         lambda hidden: fw.static_preload(fw.Model(M, K), np.ma.masked_array([1.0, 2.0], [True, False])),
         lambda hidden: given.positive("x", hidden["tangential_stiffness"][0]),
         lambda hidden: given.numbers("x", hidden["tangential_stiffness"], (1,)),
+        lambda _: fw.modal_damping(M, K, np.ma.masked_array([0.1, 0.2], [True, False])),
+        lambda _: fw.modal_damping(M, K, {1: np.ma.masked}),
+        lambda _: fw.match_faces(np.ma.masked_array(np.eye(3), np.eye(3) > 0), [0], [1], 4),
+        lambda _: fw.match_faces(np.eye(3), np.ma.masked_array([0], [True]), [1], 4),
     ],
 )
 def test_what_is_masked_is_no_number(work: Callable[[Any], object]) -> None:
@@ -219,6 +223,11 @@ def test_pairs_have_a_number_of_components(components: Any) -> None:
         ({"loads": {"g": ["1", "2"]}}, "not a number"),
         ({"loads": {"g": [1j, 2.0]}}, "not a number"),
         ({"parts": [K]}, "parts are a list"),
+        ({"loads": {"g": np.ma.masked_array([0.0, 0.1], [True, False])}}, "load 'g' has masked entries"),
+        ({"coordinates": np.ma.masked_array(np.eye(3)[:2], np.eye(3)[:2] > 0)}, "coordinates have masked entries"),
+        ({"pairs": {"p": fw.Pairs([[0.0, 1.0]], 1, areas=np.ma.masked_array([1.0], [True]))}}, "areas of contact 'p'"),
+        ({"pairs": {"p": fw.Pairs([[0.0, 1.0]], 1, {"a": np.ma.masked_array([1.0], [True])})}}, "a of contact 'p'"),
+        ({"dofs": {"tip": 1.0}}, "1.0, which is not whole"),
     ],
 )
 def test_a_builder_gives_dicts_of_numbers(wrong: Any, word: str) -> None:
@@ -226,8 +235,52 @@ def test_a_builder_gives_dicts_of_numbers(wrong: Any, word: str) -> None:
     assert word in str(fw.Structure(M, K, **wrong).complaint())
 
 
-@pytest.mark.parametrize("names", [("contact", "contact"), ("a", "a"), ("a", None), (3, "a")], ids=str)
+@pytest.mark.parametrize("names", [("contact", "contact"), ("a", "a"), ("a", None), (3, "a"), ([1], "a")], ids=str)
 def test_contacts_have_names_of_their_own(names: Any) -> None:
     """Sliders at rest go by name: those of one contact were taken for the other's, and the motion was about them."""
     both = [fw.Contact("jenkins", [[0.0, 1.0]], {"tangential_stiffness": 4.0, "friction_limit": 1.0}, n) for n in names]
     assert "one name" in refused(lambda: fw.Model(M, K, None, both))
+
+
+@pytest.mark.parametrize("kind", [float, np.float32, object, np.uint8, str], ids=lambda kind: kind.__name__)
+def test_nodes_of_faces_are_whole_numbers_of_any_type(kind: Any) -> None:
+    """Floats are what NumPy's `loadtxt` makes of a file."""
+    xyz = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 1.0, 0.0]])
+    low, high = np.array([0, 1]).astype(kind), np.array([2, 3]).astype(kind)
+    if kind is str:
+        assert "not whole numbers" in refused(lambda: fw.match_faces(xyz, low, high, 4))
+    else:
+        assert [nodes.tolist() for nodes in fw.match_faces(xyz, low, high, 4)] == [[0, 1], [3, 2]]
+
+
+def test_a_number_in_an_array_of_no_dimension_is_one(worn: fw.Branch) -> None:
+    """It was told to be no number above 0."""
+    flow = fw.Aerodynamics.from_damping({0: 0.1}, 4, np.array(2.0))  # type: ignore[arg-type]
+    assert flow == fw.Aerodynamics.from_damping({0: 0.1}, 4, 2.0) and type(flow.omega) is float
+    model = worn.problem.model
+    mode = fw.NonlinearMode(model, fw.choose_harmonics(model, 1), dof=1, rest=fw.balanced(model))
+    assert len(fw.follow(mode, 0.01, 0.02, accuracy=np.array(0.1))) > 0  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("words", [{"stop": "4"}, {"stop": ("0.1", "4")}, {"stop": 0.2, "report_at": ["0.2"]}], ids=str)
+def test_texts_are_no_numbers_of_a_branch(words: Any, worn: fw.Branch) -> None:
+    """A start was refused, these were taken."""
+    refused(lambda: fw.follow(worn.problem, 0.01, **words))
+    refused(lambda: fw.follow(worn.problem, 0.01, 0.2, accuracy="0.1"))  # type: ignore[arg-type]
+
+
+def test_one_ratio_may_be_named_twice() -> None:
+    """-3 and 3 of six sectors are one wave."""
+    one, other = (fw.Aerodynamics.from_damping({d: 0.01 for d in range(low, 4)}, 6, 2.0).influence for low in (-3, -2))
+    assert one == other
+
+
+def test_what_an_array_of_each_dof_lacks_is_told() -> None:
+    values = np.ma.masked_array([1.0, 2.0], [True, False])
+    assert "masked entries" in refused(lambda: fw.Model(M, K).numbers(values))
+    assert "finite real numbers" in refused(lambda: fw.Model(M, K).numbers([[1.0], [2.0, 3.0]]))  # type: ignore[list-item]
+
+
+def test_four_components_are_a_number_of_them() -> None:
+    assert fw.Pairs(np.eye(4), 4).n_pairs == 1
+    assert "a whole number >= 1" in refused(lambda: fw.Pairs(np.eye(4), 0))

@@ -22,6 +22,19 @@ def whole(value: object) -> int | None:
         return None
 
 
+def real(value: object, in_array: bool = False) -> float | None:
+    """The finite number that it is, NumPy's too; None of any other thing.
+
+    Parameters
+    ----------
+    in_array : also one that stands alone in an array
+    """
+    found = array_of(value)
+    alone = found.shape == () or (in_array and isinstance(value, np.ndarray) and found.size == 1)
+    number = float(found.item()) if alone and found.dtype.kind in "biuf" else np.nan
+    return number if np.isfinite(number) else None
+
+
 def place(name: str, value: object, count: int) -> int:
     """One of 0 .. count - 1.
 
@@ -75,7 +88,7 @@ def positive_or_infinite(name: str, value: object) -> float:
     ------
     InputError
     """
-    found = _array(value)
+    found = array_of(value)
     endless = found.shape == () and found.dtype.kind == "f" and found == np.inf
     return np.inf if endless else positive(name, value)
 
@@ -89,9 +102,9 @@ def numbers(
     ------
     InputError
     """
-    found = _array(values)
-    real = found.dtype.kind in "biuf" and found.shape == shape and bool(np.isfinite(found).all())
-    if not real or not ((found > above) & (found >= least)).all():
+    found = array_of(values)
+    fit = found.dtype.kind in "biuf" and found.shape == shape and bool(np.isfinite(found).all())
+    if not fit or not ((found > above) & (found >= least)).all():
         bound = f", > {above:g}" if above > -np.inf else f", >= {least:g}" if least > -np.inf else ""
         wanted = f"{shape} finite numbers{bound}" if shape else f"a finite number{bound}"
         shown = repr(values) if found.size <= 4 else str(found.shape)
@@ -105,8 +118,8 @@ def masked(values: object) -> bool:
     return isinstance(values, np.ma.MaskedArray) and bool(np.any(values.mask))
 
 
-def _array(values: object) -> Array:
-    """Also of rows of different lengths, as no numbers, and of Python's fractions."""
+def array_of(values: object) -> Array:
+    """Also of rows of different lengths and of what is masked, as no numbers, and of Python's fractions."""
     try:
         found = np.asarray(None if masked(values) else values)
         fractions = found.dtype == object and all(isinstance(value, numbers_abc.Real) for value in found.flat)

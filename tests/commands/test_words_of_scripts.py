@@ -30,7 +30,7 @@ def test_a_place_may_be_a_path(kind: Any, capfd: pytest.CaptureFixture[str]) -> 
     assert fw.main(("check", kind(CASE), "--no-solve")) == 0 and "no errors" in capfd.readouterr().out
 
 
-@pytest.mark.parametrize("words", ["check case.toml", [3], ["run", None], [b"run"]], ids=repr)
+@pytest.mark.parametrize("words", ["check case.toml", [3], ["run", None], [b"run"], Path("keys"), 5], ids=repr)
 def test_what_is_no_list_of_words_is_told(words: Any, capfd: pytest.CaptureFixture[str]) -> None:
     assert fw.main(words) == 2 and "no list of texts" in capfd.readouterr().err
 

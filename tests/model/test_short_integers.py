@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 
 import fretwave as fw
+from fretwave.cyclic.engine_order import folded
+from fretwave.model.wheel_matrix import WheelMatrix
 
 pytestmark = [pytest.mark.ranks(1), pytest.mark.filterwarnings("error")]
 
@@ -38,7 +39,7 @@ def numbers(found: Any) -> Iterator[Any]:
     elif isinstance(found, (tuple, list)):
         yield from (part for value in found for part in numbers(value))
     else:
-        yield found.toarray() if sp.issparse(found) else np.asarray(found)
+        yield found.toarray() if hasattr(found, "toarray") else np.asarray(found)
 
 
 def structure(n: Any = N, dof: Any = 1) -> fw.Structure:
@@ -56,6 +57,9 @@ WORK: dict[str, tuple[Callable[[Any], Any], int]] = {
     "ring": (lambda n: stiffness(ring(n=n)), N),
     "places": (lambda n: structure(n).around().places("a"), N),
     "wheel": (lambda n: structure(n).around(np.linspace(-0.1, 0.1, N)).own("K"), N),
+    "matrix of a wheel": (lambda n: WheelMatrix({0: np.eye(3)}, n), N),
+    "folded": (lambda k: folded(k, 100), N),
+    "folded, sectors": (lambda n: folded(-DIAMETERS, n), N),
     "pairs": (lambda n: fw.Pairs([[0.0, 1.0]], 1).around(n).B, N),
     "flow, places ahead": (lambda k: stiffness(ring(aerodynamics=fw.Aerodynamics({0: 0.3, k: 0.1}, 2.0))), 3),
     "flow, sectors": (lambda n: fw.Aerodynamics({0: 0.3, 3: 0.1j}, 2.0).wave(DIAMETERS, n), N),

@@ -173,9 +173,15 @@ def branch():
 
 
 READINGS = [
-    *(lambda branch, value=value: branch.at(value) for value in (np.inf, -np.inf, np.nan, "a", 1j, [0.2, None])),
+    *(
+        lambda branch, value=value: branch.at(value)
+        for value in (np.inf, -np.inf, np.nan, "a", 1j, [0.2, None], [[1, 2], [3]])
+    ),
     *(lambda branch, n=n: branch.curve(n) for n in (0, -1, 1.5, "8", None)),
-    *(lambda branch, place=place: branch.unknowns(place) for place in ("1", None, [1], np.nan)),
+    *(
+        lambda branch, place=place: branch.unknowns(place)
+        for place in ("1", None, [1], np.nan, np.ma.masked, np.array(["1"]))
+    ),
     *(lambda branch, row=row: branch[row] for row in (slice(1, 3), [1, 2], 1.0, None)),
 ]
 
@@ -190,6 +196,14 @@ def test_places_that_no_branch_has_are_refused(branch, number):
 @pytest.mark.parametrize("value", [np.float32(0.25), np.array(0.25), [0.25], np.array([[0.25]]), (0.25,)], ids=repr)
 def test_a_value_may_be_of_any_kind(branch, value):
     assert branch.at(value)["zeta"].tolist() == branch.at(0.25)["zeta"].tolist() != []
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.longdouble, np.array, lambda place: np.array([place])])
+def test_a_place_may_be_one_in_an_array(branch, kind):
+    """As `at` gives them."""
+    one, other = branch.unknowns(kind(0.5)), branch.unknowns(0.5)
+    assert np.array_equal(one.array, other.array)
+    one.destroy(), other.destroy()
 
 
 @pytest.mark.parametrize("given", [{"start": "a"}, {"start": None}, {"accuracy": "1e-3"}, {"observe": [0]}], ids=repr)

@@ -8,7 +8,7 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,8 +41,9 @@ def main(arguments: Sequence[str | os.PathLike[str]] | None = None) -> int:
 
 def _words(given: Sequence[str | os.PathLike[str]]) -> list[str]:
     """Of a script, in which places are paths too."""
-    words = [os.fspath(one) if isinstance(one, os.PathLike) else one for one in given]
-    if isinstance(given, str) or not all(isinstance(one, str) for one in words):
+    many = isinstance(given, Iterable) and not isinstance(given, str)
+    words = [os.fspath(one) if isinstance(one, os.PathLike) else one for one in given] if many else []
+    if not many or not all(isinstance(one, str) for one in words):
         fix = 'write for example main(["run", "case.toml"])'
         raise InputError(
             "the words of a command line are no list of texts", "main", repr(given), "texts and paths", fix

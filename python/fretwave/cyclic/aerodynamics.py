@@ -29,7 +29,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from numbers import Real
 from operator import index
 from typing import Optional
 
@@ -37,7 +36,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..given import numbers, whole
+from ..given import numbers, real, whole
 from ..model.sectors import Term, by_sector, check_number, check_wave, real_csr
 from ..model.wheel_matrix import Matrix, as_matrix
 from .engine_order import folded
@@ -70,8 +69,7 @@ class Aerodynamics:
     dof: Optional[int] = None
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.omega, Real) and 0 < self.omega < math.inf):
-            raise InputError("influence coefficients need a frequency", None, self.omega, "> 0 rad/s", "give omega")
+        object.__setattr__(self, "omega", _frequency(self.omega))
         for k, L in self.influence.items():
             if whole(k) is None:
                 what, fix = "an influence coefficient is of no blade", "give {0: own, 1: of the next blade, ...}"
@@ -88,10 +86,10 @@ class Aerodynamics:
 
         A modal viscous damper: L(theta) = -2 i zeta omega^2. Nodal diameters that are not named have none.
         """
-        sectors = check_number(sectors)
+        sectors, omega = check_number(sectors), _frequency(omega)
         wave = np.zeros(sectors, dtype=complex)
         for place, ratio in _by_wave(ratios, sectors).items():
-            wave[place] = -2j * float(numbers("damping ratio", ratio)) * omega**2
+            wave[place] = -2j * ratio * omega**2
         parts = np.fft.ifft(wave)  # 1/N sum_d L(theta_d) e^{+2 pi i k d / N}
         largest = np.abs(parts).max()
         kept = [k for k in range(sectors) if abs(parts[k]) > NOTHING * largest]
@@ -134,18 +132,27 @@ class Aerodynamics:
         return {0: sp.csr_matrix(([1.0], ([dof], [dof])), (n, n))}
 
 
+def _frequency(given: object) -> float:
+    """Above zero [rad/s]."""
+    found = real(given)
+    if found is None or found <= 0:
+        raise InputError("influence coefficients need a frequency", None, repr(given), "> 0 rad/s", "give omega")
+    return found
+
+
 def _by_wave(ratios: Mapping[int, float], sectors: int) -> dict[int, float]:
     """Ratios by nodal diameters modulo N.
 
     Raises
     ------
     InputError
-        A number of nodal diameters is not whole, or two are of one wave.
+        A number of nodal diameters is not whole, a ratio is no number, or two of one wave differ.
     """
     found: dict[int, float] = {}
-    for nodal_diameter, ratio in ratios.items():
+    for nodal_diameter, given in ratios.items():
+        ratio = float(numbers("damping ratio", given))
         place = check_wave(sectors, nodal_diameter)[1] % sectors
-        if place in found:
+        if found.get(place, ratio) != ratio:
             what, measured = "one wave has two damping ratios", f"{sorted(ratios)} of {sectors} sectors"
             raise InputError(what, None, measured, f"one of each {sectors} nodal diameters apart", "leave one out")
         found[place] = ratio

@@ -11,12 +11,14 @@ phi = j alpha + Omega t, all waves are mirrored: the engine order is given as ne
 from __future__ import annotations
 
 import math
+from operator import index
 
 
-def folded(index: int, sectors: int) -> int:
+def folded(number: int, sectors: int) -> int:
     """Nodal diameters -N/2 < ND <= N/2 of the wave with this spatial index, negative for a backward wave."""
-    index %= sectors
-    return index - sectors if 2 * index > sectors else index
+    around = index(sectors)
+    place = index(number) % around
+    return place - around if 2 * place > around else place
 
 
 def speed_rpm(omega: float, order: int) -> float:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Indices
 from ..errors import InputError
-from ..given import place
+from ..given import masked, place, whole
 from ..model.sectors import check_number, rotation
 
 #: Distance of matching nodes, as a share of the faces' extent.
@@ -63,6 +63,9 @@ def match_faces(
         With the nodes that have no partner, and what would match: the faces swapped, another number of sectors or
         axis; or for nodes on the axis, which both faces share, and such as are not there.
     """
+    if masked(xyz):
+        fix = "give the coordinates of all nodes"
+        raise InputError("nodes of a mesh have no places", "xyz", "masked entries", "(n_nodes, 3) numbers", fix)
     points, low, high = np.asarray(xyz, dtype=float), _nodes("low", low), _nodes("high", high)
     sectors = check_number(sectors)
     for node in (end for nodes in (low, high) if len(nodes) for end in (nodes.min(), nodes.max())):
@@ -91,11 +94,20 @@ def match_faces(
 
 def _nodes(name: str, given: npt.ArrayLike) -> Indices:
     """Node numbers of a face; an empty list is none."""
-    found = np.asarray(given)
-    if found.size and found.dtype.kind not in "iu":
-        fix = "give node numbers, not a mask"
-        raise InputError(f"nodes of the {name} face are not whole numbers", None, str(found.dtype), "integers", fix)
+    found = np.asarray(None if masked(given) else given)
+    if found.dtype.kind in "iu":
+        return found.astype(np.intp)
+    logical = any(isinstance(one, (bool, np.bool_)) for one in found.flat)
+    if logical or not all(_is_whole(one) for one in found.flat):
+        measured = "masked entries" if masked(given) else str(found.dtype)
+        fix = "give node numbers, not a mask" if logical or masked(given) else "give node numbers"
+        raise InputError(f"nodes of the {name} face are not whole numbers", None, measured, "integers", fix)
     return found.astype(np.intp)
+
+
+def _is_whole(one: object) -> bool:
+    """Also one that a file of floats has given."""
+    return whole(one) is not None or (isinstance(one, (float, np.floating)) and bool(one % 1 == 0))
 
 
 def _nearest(low: Array, high: Array, angle: float, axis: str) -> _Nearest:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..given import whole
+from ..given import masked, whole
 from ..texts import nearest, shortened
 from ..units import SYSTEMS
 from .cells import wrong_cells
@@ -47,13 +47,17 @@ def complaint_of(structure: Structure) -> str | None:
         if np.shape(matrix) != (n, n):
             return f"{name} is {np.shape(matrix)[0]} x {np.shape(matrix)[1]}, M is {n} x {n}"
     for name, number in structure.dofs.items():
-        if whole(number) is None or not 0 <= number < n:
+        if whole(number) is None:
+            return f"dof '{name}' has the number {number!r}, which is not whole"
+        if not 0 <= number < n:
             return f"dof '{name}' has the number {number} of {n}"
     if structure.names is not None and (len(structure.names), len(set(structure.names))) != (n, n):
         return f"{len(structure.names)} names, {len(set(structure.names))} of them different, of {n} dofs"
     for name, load in structure.loads.items():
         if np.shape(load) != (n,):
             return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
+        if masked(load):
+            return f"load '{name}' has masked entries"
         if np.asarray(load).dtype.kind not in "biuf" or not np.all(np.isfinite(load)):
             return f"load '{name}' has an entry that is not a number"
     return _wrong_grid(structure) or next(
@@ -74,6 +78,8 @@ def _wrong_grid(structure: Structure) -> str | None:
     """What does not fit in nodes and cells."""
     if structure.coordinates is None:
         return "there are cells, but no coordinates" if structure.cells or structure.hexahedra is not None else None
+    if masked(structure.coordinates):
+        return "coordinates have masked entries"
     given = structure.displacements
     dofs = structure.n_dof
     if structure.expansion is not None:

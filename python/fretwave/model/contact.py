@@ -237,8 +237,8 @@ def contact_list(given: Iterable[Contact]) -> list[Contact]:
         expected, fix = "a list of fretwave.Contact", "write `contacts=[contact]`, or leave it out"
         raise InputError("contacts of a model are no list of contacts", "contacts", repr(given), expected, fix)
     names = [one.name for one in contacts]
-    if len(set(names)) < len(names) or not all(isinstance(name, str) for name in names):
-        fix = "give each its own: fretwave.Contact(..., name=...)"
+    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+        fix = 'give each its own: fretwave.Contact(law, B, parameters, "another")'
         raise InputError(
             "two contacts have one name, or one has none", "contacts", names, "a text each, all others", fix
         )

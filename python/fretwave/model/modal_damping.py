@@ -22,7 +22,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Complex
 from ..errors import InputError
-from ..given import not_negative, whole
+from ..given import array_of, not_negative, whole
 from ..texts import counted
 from .contact import Contact
 from .sectors import Term, by_sector, check_number, real_csr
@@ -142,8 +142,8 @@ def _of_modes(ratios: Ratios, omega: Array, where: str | None) -> Array:
     """Damping ratio of every mode."""
     if isinstance(ratios, Mapping):
         given = dict(ratios)
-    elif np.ndim(ratios):
-        given = dict(enumerate(np.asarray(ratios).tolist(), 1))
+    elif array_of(ratios).ndim:
+        given = dict(enumerate(array_of(ratios).tolist(), 1))
     else:
         return np.full(len(omega), not_negative("damping ratio", ratios))
     zeta = np.zeros(len(omega))

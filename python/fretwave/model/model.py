@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import LARGEST, masked, with_a_square
+from ..given import LARGEST, array_of, masked, with_a_square
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
@@ -259,8 +259,9 @@ class Model(Destroyable):
         InputError
             They are none, or not one a dof.
         """
-        given = np.asarray(None if masked(values) else values)
-        measured, expected = f"{given.shape} of {given.dtype}", f"({self.n_dof},) finite real numbers"
+        given = array_of(values)
+        measured = "masked entries" if masked(values) else f"{given.shape} of {given.dtype}"
+        expected = f"({self.n_dof},) finite real numbers"
         if given.shape == (self.n_dof,) and given.dtype.kind in "biuf":
             if (abs(given) <= LARGEST).all():
                 return given.astype(float, copy=False)

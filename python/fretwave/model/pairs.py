@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array
 from ..errors import InputError
-from ..given import whole
+from ..given import masked, whole
 from .sectors import Parts, Term, around, by_sector, combine, real_csr
 
 #: A law's parameters: a number, or one per pair.
@@ -65,7 +65,9 @@ class Pairs:
         rows = whole(self.components) or 0
         if rows < 1:
             measured, fix = repr(self.components), "count the rows of B that are of one pair"
-            raise InputError("contact pairs have no such number of components", None, measured, "1, 2 or 3", fix)
+            raise InputError(
+                "contact pairs have no such number of components", None, measured, "a whole number >= 1", fix
+            )
         self.components = rows
 
     def __repr__(self) -> str:
@@ -114,6 +116,9 @@ class Pairs:
         n = self.n_pairs
         shapes = {"areas": (n,), "points": (n, 3), "frames": (n, 3, 3), "faces": (n,), "positions": (n, 2)}
         given = {key: getattr(self, key) for key in shapes if getattr(self, key) is not None}
+        hidden = [key for key, value in {**given, **self.parameters}.items() if masked(value)]
+        if hidden:
+            return f"{hidden[0]} of contact '{name}' have masked entries"
         for key, value in given.items():
             if np.shape(value) != shapes[key]:
                 return f"{key} of contact '{name}' have the shape {np.shape(value)}, not {shapes[key]}"

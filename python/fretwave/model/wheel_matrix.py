@@ -50,7 +50,7 @@ class WheelMatrix:
     def __init__(self, term: Term, sectors: int, factors: npt.ArrayLike | None = None) -> None:
         parts = {k: real_csr(A) for k, A in by_sector(term).items()}
         self.sectors, (rows, columns) = index(sectors), parts[0].shape
-        self.shape = (sectors * rows, sectors * columns)
+        self.shape = (self.sectors * rows, self.sectors * columns)
         self._rings: list[Ring] = [(parts, None if factors is None else np.asarray(factors, dtype=float))]
         self._added: list[Sparse] = []
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
-from ..given import numbers, whole
+from ..given import array_of, numbers, whole
 from ..hb.states import State
 from ..post.mode_curve import AT_THE_END, NO_DAMPING
 from .hermite import Cubic
@@ -131,7 +131,7 @@ class Curve:
                 "the branch cannot be read at this", None, text, "one of " + ", ".join(known), f"at({known[0]}=...)"
             )
         name = next(iter(given))
-        return name, numbers(name, given[name], np.shape(given[name])).ravel()
+        return name, numbers(name, given[name], array_of(given[name]).shape).ravel()
 
     def _crossings(self, name: str, value: float) -> list[float]:
         """Places where a column of the state has this value."""

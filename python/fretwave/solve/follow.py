@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from petsc4py import PETSc
 
 from ..columns import FORCED, MODE, columns_named, over, with_discretisation
 from ..errors import InputError
-from ..given import numbers
+from ..given import array_of, numbers, real
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.observed import Observed, unit_of
 from ..hb.observer import Observer
@@ -101,9 +100,7 @@ def follow(
     if not isinstance(problem, HarmonicProblem) or problem.meaning is None:
         given, fix = type(problem).__name__, "give one of these; fw.Continuation follows others"
         raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
-    if accuracy is not None and not (isinstance(accuracy, Real) and 0 < accuracy < 1):
-        fix = "give for example accuracy=1e-3"
-        raise InputError("accuracy is a share of what is computed", None, accuracy, "above 0, below 1", fix)
+    accuracy = None if accuracy is None else _accuracy(accuracy)
     problem.model.check_unchanged()
     own = isinstance(start, PETSc.Vec)
     first = problem.parameter(start) if own else float(numbers("start", start))
@@ -178,18 +175,24 @@ def _free(point: Point | None) -> None:
         point.tangent.destroy()
 
 
+def _accuracy(given: object) -> float:
+    """A share."""
+    found = real(given)
+    if found is None or not 0 < found < 1:
+        fix = "give for example accuracy=1e-3"
+        raise InputError("accuracy is a share of what is computed", None, repr(given), "above 0, below 1", fix)
+    return found
+
+
 def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, float, bool | None]:
     """Ends of the range, and whether the parameter grows at first (None: away from the nearer end)."""
-    try:
-        ends = np.asarray(stop, dtype=float)
-    except (TypeError, ValueError):
-        ends = np.full(3, np.nan)
-    if ends.shape not in ((), (2,)) or not (ends >= 0).all():
+    ends = array_of(stop)
+    if ends.shape not in ((), (2,)) or ends.dtype.kind not in "biuf" or not (ends >= 0).all():
         expected, fix = "a number >= 0, or two: (low, high)", "say where the branch shall end"
         raise InputError("a branch cannot end there", "stop", repr(stop), expected, fix)
     if not ends.shape:
         return min(first, float(ends)), max(first, float(ends)), float(ends) > first
-    low, high = ends.tolist()
+    low, high = ends.astype(float).tolist()
     if low < high and not low * (1 - AT_AN_END) <= first <= high * (1 + AT_AN_END):
         fix = "start within it, or give the end alone: stop=high"
         raise InputError("the branch begins outside its range", None, first, f"{low:g} to {high:g}", fix)
@@ -198,11 +201,8 @@ def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, floa
 
 def _reports(given: Sequence[float]) -> list[float]:
     """Parameter values, as numbers."""
-    try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        values = np.full((), np.nan)
-    if values.ndim != 1 or not np.isfinite(values).all():
+    values = array_of(given)
+    if values.ndim != 1 or values.dtype.kind not in "biuf" or not np.isfinite(values).all():
         fix = "give for example report_at=[0.1, 1.0]"
         raise InputError("no point can be located there", "report_at", repr(given), "a list of numbers", fix)
     return [float(value) for value in values]

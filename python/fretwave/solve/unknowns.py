@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
+from ..given import real
 from .hermite import between, derivatives, piece, slopes
 
 if TYPE_CHECKING:
@@ -73,11 +74,11 @@ class Unknowns:
 
     def vector(self, place: float) -> PETSc.Vec:
         """Unknowns at a place. Collective."""
-        given = np.asarray(place).item() if np.size(place) == 1 and not np.ndim(place) else None
-        if not (isinstance(given, (int, float)) and 0 <= given <= len(self.y) - 1):
+        given = real(place, in_array=True)
+        if given is None or not 0 <= given <= len(self.y) - 1:
             expected, fix = f"0 to {len(self.y) - 1}", "take a row's number, or a place that `at` gives"
             raise InputError("the branch has no such place", None, repr(place), expected, fix)
-        i, x = piece(float(given), len(self.y))
+        i, x = piece(given, len(self.y))
         values = self.y[i]
         if x > 0:
             y0, t0, y1, t1 = self.y[i], self.tangents[i], self.y[i + 1], self.tangents[i + 1]
