@@ -193,7 +193,10 @@ def test_places_that_no_branch_has_are_refused(branch, number):
         READINGS[number](branch)
 
 
-@pytest.mark.parametrize("value", [np.float32(0.25), np.array(0.25), [0.25], np.array([[0.25]]), (0.25,)], ids=repr)
+KINDS = {"float32": np.float32(0.25), "array": np.array(0.25), "list": [0.25], "matrix": np.array([[0.25]]), "tuple": (0.25,)}
+
+
+@pytest.mark.parametrize("value", KINDS.values(), ids=KINDS.keys())
 def test_a_value_may_be_of_any_kind(branch, value):
     assert branch.at(value)["zeta"].tolist() == branch.at(0.25)["zeta"].tolist() != []
 
