@@ -193,7 +193,13 @@ def test_places_that_no_branch_has_are_refused(branch, number):
         READINGS[number](branch)
 
 
-KINDS = {"float32": np.float32(0.25), "array": np.array(0.25), "list": [0.25], "matrix": np.array([[0.25]]), "tuple": (0.25,)}
+KINDS = {
+    "float32": np.float32(0.25),
+    "array": np.array(0.25),
+    "list": [0.25],
+    "matrix": np.array([[0.25]]),
+    "tuple": (0.25,),
+}
 
 
 @pytest.mark.parametrize("value", KINDS.values(), ids=KINDS.keys())
