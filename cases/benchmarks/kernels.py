@@ -1,7 +1,8 @@
 """What a point of a branch costs on a synthetic model with contact in three dimensions, and where its time goes.
 
 Run it on one core from the top folder:  OMP_NUM_THREADS=1 .venv/bin/python cases/benchmarks/kernels.py
-Times are processor time of this process, the same as wall time on an idle machine. Shares by function need `perf`.
+Times of points are wall time, those of single calls processor time of this process: the same on an idle machine.
+Shares by function need `perf`.
 What a pair costs alone is in CONTACT.md.
 """
 

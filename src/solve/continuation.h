@@ -138,6 +138,7 @@ class Continuation {
   int anchor_sign();
   double along_facet(Vec y, Vec tangent, double least = 0);
   int orientation(Vec y, Vec tangent);
+  int orientation(Vec y, Vec tangent, double cosine);
   bool beyond_corner(Trial const&) const;
   bool leads_back(Trial&);
   std::uint64_t piece(Vec y) { return problem_.piece(y, finely_); }

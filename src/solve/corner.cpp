@@ -94,8 +94,10 @@ double Continuation::along_facet(Vec y, Vec tangent, double least) {
 /// +1: `tangent` at y, behind a corner ahead of the anchor, leads on; -1: it leads back; 0: it cannot be
 /// told. Facets that are passed at once by symmetry have the same c and n . t along it, and off it they may
 /// turn the determinant's sign: it is asked where facets differ. Collective.
-int Continuation::orientation(Vec y, Vec tangent) {
-  const double cosine = along_facet(y, tangent);
+int Continuation::orientation(Vec y, Vec tangent) { return orientation(y, tangent, along_facet(y, tangent)); }
+
+/// By the cosine along the facet. Collective.
+int Continuation::orientation(Vec y, Vec tangent, double cosine) {
   const int by_products = cosine > 0 ? 1 : -1;
   if (std::abs(cosine) >= surely_one) return by_products;
   if (const int here = anchor_sign()) return here * determinant(y, weighted(weights_, tangent));
@@ -189,12 +191,8 @@ double Continuation::within_piece(Vec y, Vec tangent, double reach) {
 }
 
 /// +1: `tangent` leads on into the piece that begins just before y, -1: back out of it; 0: it cannot be told,
-/// as where pieces are shorter than `reach`, or need not be: a single facet's products say it.
+/// as where pieces are shorter than `reach`.
 int Continuation::into_piece(Vec y, Vec tangent, double reach) {
-  const double cosine = along_facet(y, tangent);
-  if (std::abs(cosine) >= surely_one ||
-      (std::abs(cosine) >= one_facet && orientation(y, tangent) * cosine > 0))
-    return 0;
   const VecHandle back = copy(tangent);
   check(VecScale(back, -1));
   const double ahead = within_piece(y, tangent, reach), behind = within_piece(y, back, reach);
@@ -216,8 +214,11 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   check(VecScale(tangent, 1 / size));
   const bool straight = dot(row_, tangent) > 1 - no_corner && fits(there);
   if (straight && on_piece(piece(anchor_.y), beyond)) return {};
-  const int placed = straight ? 1 : seen ? into_piece(there, tangent, reach) : 0;
-  const int sign = placed ? placed : orientation(there, tangent);
+  const double cosine = straight ? 1 : along_facet(there, tangent);
+  const int told = straight ? 1 : orientation(there, tangent, cosine);
+  const bool single = std::abs(cosine) >= one_facet && told * cosine > 0;
+  const int placed = straight ? 1 : seen && !single ? into_piece(there, tangent, reach) : 0;
+  const int sign = placed ? placed : told;
   if (sign == 0) return {};
   check(VecScale(tangent, sign));
   const double on = within_piece(there, tangent, reach);
