@@ -232,6 +232,17 @@ def test_what_is_advised_after_a_loop_can_be_set(capfd) -> None:
     assert len(settings) == 2
 
 
+@pytest.mark.parametrize(
+    "reason", ["is a closed loop: it comes back to {}", "comes back to {}, where it began"], ids=["closed", "back"]
+)
+def test_a_response_that_comes_round_may_be_begun_at_its_other_end(reason) -> None:
+    """Its first frequency may lie under a curve that closes on itself; from the last one another leads through."""
+    other = "--set forced.frequency="
+    assert other in advice("forced", "the branch " + reason.format("2 rad/s"))
+    assert other not in advice("forced", "the branch " + reason.format("amplitude 2"))
+    assert other not in advice("forced", "the branch turns back onto itself: it passes 2 rad/s a second time")
+
+
 @pytest.mark.parametrize("reason", ["step too small: DIVERGED_MAX_IT", "the branch comes back to amplitude 2, where"])
 def test_steps_that_pass_over_loops_can_be_asked_for(reason) -> None:
     option = re.search(r"--petsc '-(fw_\w+) 1e300'", advice("mode", reason))

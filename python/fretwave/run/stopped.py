@@ -58,10 +58,20 @@ def advice(name: str, reason: str) -> str:
         )
     if any(ending in reason for ending in ("a closed loop", "back onto itself", "turns in circles")):
         shorter = f"--set {name}.step.initial=0.01 --set {name}.step.maximum=0.03"
-        return f"shorter steps ({shorter}): one may have led onto another curve"
+        return f"{_other_end(name, reason)}shorter steps ({shorter}): one may have led onto another curve"
     if "comes back to amplitude" in reason:
         return f"--set {name}.normalise=... to a dof that goes on growing with the motion, shorter steps, or {OVER}"
-    return f"shorter steps (--set {name}.step.minimum=1e-11), or {OVER}; --petsc -snes_monitor shows Newton's steps"
+    return (
+        f"{_other_end(name, reason)}shorter steps (--set {name}.step.minimum=1e-11), or {OVER};"
+        " --petsc -snes_monitor shows Newton's steps"
+    )
+
+
+def _other_end(name: str, reason: str) -> str:
+    """Of a response that came round to where it has been: from the other end another motion may lead through."""
+    if "rad/s" not in reason or not any(ending in reason for ending in ("a closed loop", "where it began")):
+        return ""
+    return f"the range from its other end (--set {name}.frequency=..., the last one first), or "
 
 
 def joined(failures: Sequence[NotConverged]) -> NotConverged:
