@@ -80,6 +80,12 @@ using SnesHandle = Handle<SNES, SNESDestroy>;
 using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
 using IsHandle = Handle<IS, ISDestroy>;
 
+inline PetscInt global_size(Vec v) {
+  PetscInt n;
+  check(VecGetSize(v, &n));
+  return n;
+}
+
 inline PetscInt local_size(Vec v) {
   PetscInt n;
   check(VecGetLocalSize(v, &n));

@@ -90,9 +90,9 @@ MatHandle Bordered::matrix() {
   rows_.clear(), cols_.clear();
   problem_.pattern(rows_, cols_);
   problem_entries_ = PetscInt(rows_.size());
-  PetscInt begin, end, global;
+  PetscInt begin, end;
   check(VecGetOwnershipRange(row_, &begin, &end));
-  check(VecGetSize(row_, &global));
+  const PetscInt global = global_size(row_);
   for (PetscInt k = begin; k < end; ++k) rows_.push_back(global - 1), cols_.push_back(k);
   v_.resize(rows_.size());
   dense_ = comm_size(problem_.comm()) == 1 && global <= dense_limit;

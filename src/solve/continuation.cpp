@@ -142,8 +142,12 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
     return "the branch bends more than a step resolves";
   if (may_shorten)
     return leads_back(trial) || fell_back(trial) ? "the corrector lands on another branch" : "";
-  if (angle < kink_angle) return "";
-  const int sign = beyond_corner(trial) ? 1 : orientation(trial.y, trial.tangent);
+  if (angle < kink_angle)
+    return round_facet(anchor_.y, trial.y) && orientation(trial.y, trial.tangent) < 0
+               ? "the corrector lands on another branch"
+               : "";
+  const int sign =
+      beyond_corner(trial) && !round_facet(anchor_.y, trial.y) ? 1 : orientation(trial.y, trial.tangent);
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
   if (sign < 0) {
     check(VecScale(trial.tangent, -1));
@@ -236,6 +240,10 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
     }
   }
   if (!adrift_.empty()) return finish(adrift_, false), std::nullopt;
+  if (auto behind = behind_touched_facet(length)) {
+    next_length = next_step(*behind, length, length);
+    return behind;
+  }
   if (failure.last.empty()) failure.last = "corners of the branch lie closer together than the smallest step";
   finish("step too small: " + (failure.explained.empty() ? failure.last : failure.explained), false);
   return {};

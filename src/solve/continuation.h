@@ -134,6 +134,7 @@ class Continuation {
   bool passes(Trial const&, Trail::Meeting const&);
 
   // Corners of the branch (corner.cpp)
+  static bool small(Vec y);
   int determinant(Vec y, Vec row);
   int anchor_sign();
   double along_facet(Vec y, Vec tangent, double least = 0);
@@ -150,6 +151,15 @@ class Continuation {
   double within_piece(Vec y, Vec tangent, double reach);
   int into_piece(Vec y, Vec tangent, double reach);
   std::optional<Trial> turn_corner(double beyond, double reach, bool seen);
+  std::optional<Trial> along_piece(Vec y, Vec tangent, double reach, double aside);
+
+  // Where it touches a facet (round_facet.cpp)
+  bool round_facet(Vec a, Vec b);
+  bool on_other_sheet(Trial const&, Trial const&);
+  VecHandle stiffest();
+  std::optional<VecHandle> across_round_facet();
+  std::optional<Trial> turn_round_facet(Vec across, double length);
+  std::optional<Trial> behind_touched_facet(double& length);
 
   // What lies inside a step (events.cpp)
   bool correct_inside(Trial&, double at, double length);
@@ -192,7 +202,7 @@ class Continuation {
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, circles_ = 0, crawled_ = 0;
   bool way_ = false, upwards_ = true, taken_over_ = false, turned_ = false, finely_ = false, wary_ = false,
-       finished_ = false, converged_ = false;
+       touching_ = false, finished_ = false, converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
   std::string reason_;

@@ -21,7 +21,6 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr PetscInt small = 1000;         // unknowns whose determinant is had in some 50 ms
 constexpr double surely_one = 1 - 1e-6;  // the same cosine, where nothing else can be: facets of two samples
                                          // side by side are alike
 constexpr double one_facet = 0.98;       // least cosine between the two vectors of a single facet
@@ -62,15 +61,16 @@ int sign_of(std::vector<double> dense, int n) {
 
 }  // namespace
 
+/// So that a determinant is had in some 50 ms.
+bool Continuation::small(Vec y) { return global_size(y) <= 1000; }
+
 /// Sign of det [J(y); row], 0 if it is singular or too large to tell. Collective.
 int Continuation::determinant(Vec y, Vec row) {
-  PetscInt size;
-  check(VecGetSize(y, &size));
-  if (size > small) return 0;
+  if (!small(y)) return 0;
   newton_.system().close(row, 0);
   MatHandle J = newton_.system().matrix();
   newton_.system().assemble(y, J);
-  int sign = sign_of(whole(J), int(size));
+  int sign = sign_of(whole(J), int(global_size(y)));
   MPI_Bcast(&sign, 1, MPI_INT, 0, problem_.comm());  // nearly singular it may be another one on another rank
   return sign;
 }
@@ -99,7 +99,7 @@ int Continuation::orientation(Vec y, Vec tangent) { return orientation(y, tangen
 /// By the cosine along the facet. Collective.
 int Continuation::orientation(Vec y, Vec tangent, double cosine) {
   const int by_products = cosine > 0 ? 1 : -1;
-  if (std::abs(cosine) >= surely_one) return by_products;
+  if (std::abs(cosine) >= surely_one && !round_facet(anchor_.y, y)) return by_products;
   if (const int here = anchor_sign()) return here * determinant(y, weighted(weights_, tangent));
   return std::abs(cosine) >= one_facet ? by_products : 0;
 }
@@ -123,11 +123,10 @@ bool Continuation::beyond_corner(Trial const& trial) const {
 /// that begins beside it. Asked of small systems, where a determinant costs less than a Newton step. A branch
 /// point looks the same: it is passed in a step of `kink_length`, of which this is not asked.
 bool Continuation::leads_back(Trial& trial) {
-  PetscInt size;
-  check(VecGetSize(trial.y, &size));
-  if (size > quick) return false;
+  if (global_size(trial.y) > quick) return false;
   const double cosine = along_facet(trial.y, trial.tangent, no_force);
-  if (std::abs(cosine) >= surely_one) return cosine < 0;
+  if (cosine <= -surely_one) return true;  // or it turns on the way: shorter steps tell
+  if (cosine >= surely_one && !round_facet(anchor_.y, trial.y)) return false;
   trial.sign = determinant(trial.y, weighted(weights_, trial.tangent));
   return trial.sign ? anchor_sign() * trial.sign < 0 : cosine <= -one_facet;
 }
@@ -221,14 +220,21 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   const int sign = placed ? placed : told;
   if (sign == 0) return {};
   check(VecScale(tangent, sign));
-  const double on = within_piece(there, tangent, reach);
+  auto trial = along_piece(there, tangent, reach, beyond);
+  if (trial && !placed && orientation(trial->y, trial->tangent) < 0) return {};
+  return trial;
+}
+
+/// A solution along the tangent of the piece that y lies on, which is off the branch by `aside`.
+std::optional<Continuation::Trial> Continuation::along_piece(Vec y, Vec tangent, double reach, double aside) {
+  const double on = within_piece(y, tangent, reach);
   if (!(on > shortest)) return {};
-  const VecHandle row = weighted(weights_, tangent), guess = moved(there, on, tangent);
+  const VecHandle row = weighted(weights_, tangent), guess = moved(y, on, tangent);
   Trial trial = at(copy(guess));
   if (!correct(trial, row, dot(row, guess), row)) return {};
-  if (!(distance(trial.y, guess) <= beyond + on)) return {};
-  if (!(dot(row, trial.tangent) >= std::cos(steps_.max_angle))) return {};
-  if (!placed && orientation(trial.y, trial.tangent) < 0) return {};
+  if (!(distance(trial.y, guess) <= aside + on)) return {};
+  const double least = touching_ && round_facet(anchor_.y, trial.y) ? 0 : std::cos(steps_.max_angle);
+  if (!(dot(row, trial.tangent) >= least)) return {};
   return trial;
 }
 

@@ -250,11 +250,7 @@ void LinearSolver::serve_beside(double tolerance) {
   check(KSPGetTolerances(tangent_, &tangent_least_, nullptr, nullptr, nullptr));
 }
 
-PetscInt LinearSolver::unknowns() const {
-  PetscInt all;
-  check(VecGetSize(point_, &all));
-  return all;
-}
+PetscInt LinearSolver::unknowns() const { return global_size(point_); }
 
 /// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.
 bool LinearSolver::solve(Vec b, Vec x, double rounding, double share) {

@@ -73,7 +73,8 @@ bool Continuation::passes(Trial const& trial, Trail::Meeting const& meeting) {
   Trail::fill(row, meeting.functional);
   Trial there = at(copy(trial.y));
   there.tangent = copy(trial.tangent);
-  return walk(there, row, meeting.place[meeting.functional]) && Trail::same(there.y, meeting.place);
+  return walk(there, row, meeting.place[meeting.functional]) && Trail::same(there.y, meeting.place) &&
+         !on_other_sheet(trial, there);
 }
 
 }  // namespace fretwave::solve

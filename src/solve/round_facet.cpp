@@ -1,0 +1,105 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "solve/continuation.h"
+#include "solve/vectors.h"
+
+/// Facets that a branch touches from both sides: where opposite discs begin to hold a slider, or cease to.
+///
+/// delta is what the slider has to go between the two, or less than nothing, by how far they overlap. Where
+/// it goes round it lags by the root of delta behind the line of their centres, where it is held it lies in a
+/// corner of what they have in common, the root of -delta beside it: w = w_c + k eta c with eta^2 = |delta|
+/// and another k on either side. In R(y, w) = 0 both pieces leave the facet along R_y v = -R_w c with v .
+/// delta_y = 0, each its own way: where the two k have one sign the branch turns right round, and the
+/// tangent's extension need not meet the other piece. There J = R_y + g (R_w c) delta_y^T, g = +-k / (2 eta)
+/// without bound, which tells delta_y.
+namespace fretwave::solve {
+
+namespace {
+
+constexpr double least = 1e-15, most = 1e-3;  // way across, in unknowns
+constexpr double longest = 1e-4;              // step in which such a facet is passed
+constexpr int powers = 3, halvings = 4;
+
+}  // namespace
+
+/// Whether a facet lies between two places that is seen finely alone, of systems whose determinant can be
+/// asked. Collective.
+bool Continuation::round_facet(Vec a, Vec b) {
+  return small(a) && problem_.piece(a) == problem_.piece(b) &&
+         problem_.piece(a, true) != problem_.piece(b, true);
+}
+
+/// Whether two solutions lie on two sheets that touch such a facet where they meet, of small systems: both
+/// tangents point the same way, the branch goes along one of them and comes back along the other. Collective.
+bool Continuation::on_other_sheet(Trial const& a, Trial const& b) {
+  return round_facet(a.y, b.y) &&
+         determinant(a.y, weighted(weights_, a.tangent)) * determinant(b.y, weighted(weights_, b.tangent)) <
+             0;
+}
+
+/// The direction of which the Jacobian at the anchor makes most, of length 1. Collective.
+VecHandle Continuation::stiffest() {
+  newton_.system().close(row_, 0);
+  MatHandle J = newton_.system().matrix();
+  newton_.system().assemble(anchor_.y, J);
+  VecHandle across = copy(anchor_.tangent), forces = like(across);
+  check(VecSet(across, 1));
+  for (int k = 0; k < powers; ++k) {
+    check(MatMult(J, across, forces));
+    check(MatMultTranspose(J, forces, across));
+    check(VecScale(across, 1 / norm(across)));
+  }
+  return across;
+}
+
+/// From the anchor to just across a facet of this kind, if one lies nearby. Collective.
+std::optional<VecHandle> Continuation::across_round_facet() {
+  const VecHandle across = stiffest();
+  for (const double way : {1.0, -1.0})
+    for (double far = least; far <= most; far *= 10) {
+      if (!round_facet(anchor_.y, moved(anchor_.y, way * far, across))) continue;
+      double near = far / 10;
+      for (int k = 0; k < halvings; ++k) {
+        const double middle = std::sqrt(near * far);
+        (round_facet(anchor_.y, moved(anchor_.y, way * middle, across)) ? far : near) = middle;
+      }
+      return moved(anchor_.y, way * far, across);
+    }
+  return {};
+}
+
+/// The branch behind such a facet, by the tangent just across it. Collective.
+std::optional<Continuation::Trial> Continuation::turn_round_facet(Vec across, double length) {
+  VecHandle tangent = copy(anchor_.tangent);
+  newton_.system().close(row_, 0);
+  if (!newton_.tangent(across, tangent, true)) return {};
+  const double size = weighted_norm(weights_, tangent);
+  if (!std::isfinite(size)) return {};
+  check(VecScale(tangent, anchor_sign() * determinant(across, weighted(weights_, tangent)) / size));
+  finely_ = true;
+  auto trial = along_piece(across, tangent, length, length);
+  finely_ = false;
+  if (!trial || !round_facet(anchor_.y, trial->y) || orientation(trial->y, trial->tangent) <= 0) return {};
+  return trial;
+}
+
+/// The same where no step leads on. The tangent turns with the root of the distance, and by much in the
+/// shortest step that can be made. Collective.
+std::optional<Continuation::Trial> Continuation::behind_touched_facet(double& length) {
+  if (!anchor_sign()) return {};
+  const auto across = across_round_facet();
+  if (!across) return {};
+  for (double reach = longest; reach >= steps_.minimum; reach /= 2) {
+    length = reach;
+    touching_ = true;
+    auto trial = turn_fine_corner(length);
+    if (!trial) trial = turned(turn_round_facet(*across, length), length);
+    touching_ = false;
+    if (trial) return trial;
+  }
+  return {};
+}
+
+}  // namespace fretwave::solve
