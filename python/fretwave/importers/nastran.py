@@ -6,8 +6,10 @@ either byte order, single or double precision, full or sparse. Which rows are wh
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +19,19 @@ from ..texts import display
 from .constraints import Constraints
 from .entries import Entries
 from .extras import reader_of
+from .nastran_deck import flat
 from .nodes import Nodes
 from .npz import choose
 
 #: What matrices are called: of the analysis set, of an external superelement (EXTSEOUT), of all grid points.
 USUAL = {"K": ("KAA", "KXX", "KGG"), "M": ("MAA", "MXX", "MGG"), "C": ("BAA", "BXX", "BGG")}
 #: Cards that make dofs depend on others.
-JOINS = r"(MPC|RBE[123]|RBAR1?|RROD|RJOINT|RSPLINE|RTRPLT1?|RSSCON)[ *,]"
-GRID = r"GRID[ *,]"
+JOINS = r"(MPC|RBE[123]|RBAR1?|RROD|RJOINT|RSPLINE|RTRPLT1?|RSSCON),"
+GRID = r"GRID,"
 #: Cards that tell up to two coordinate systems by the numbers of three grid points each.
-BY_POINTS = r"CORD1[RCS][ *,]"
+BY_POINTS = r"CORD1[RCS],"
+#: Names of cards that are read or looked for.
+WANTED = re.compile(r"(GRID|GRDSET|SEQGP|CORD[12][RCS]|" + JOINS.removesuffix(",") + r")(?![A-Z0-9])")
 
 
 def read(path: Path, letter: str, variable: str | None = None) -> Entries:
@@ -59,36 +64,44 @@ def read_grid(path: Path) -> Nodes:
     """
     where = display(path)
     bulk = reader_of("pyyeti.nastran.bulk", "pyyeti", where)
-    grid = bulk.rdcards(str(path), GRID, regex=True, return_var="list", no_data_return=[])
-    _check_cards(grid, path)
-    _check_systems(grid, bulk.rdcards(str(path), BY_POINTS, regex=True, return_var="list", no_data_return=[]), where)
-    table = bulk.bulk2uset(str(path))[0]
+    deck = StringIO(flat(path, WANTED))
+    grid = bulk.rdcards(deck, GRID, regex=True, return_var="list", no_data_return=[])
+    _check_cards(grid, where, "ENDDATA" in deck.getvalue())
+    _check_systems(grid, bulk.rdcards(deck, BY_POINTS, regex=True, return_var="list", no_data_return=[]), where)
+    _check_order(deck.getvalue(), where)
+    table = bulk.bulk2uset(deck)[0]
     places = table[["x", "y", "z"]].to_numpy(dtype=float).reshape(-1, 6, 3)  # behind x, y, z: system, origin, turn
     numbers = table.index.get_level_values(0).to_numpy(dtype=np.int64)[::6]
     turned = numbers[places[:, 1, 0] != 0]
-    if len(turned) or bulk.rdcards(str(path), "GRDSET") is not None:
+    if len(turned) or bulk.rdcards(deck, "GRDSET") is not None:
         measured = f"CD of GRID {turned[0]}, {len(turned)} such" if len(turned) else "GRDSET"
         fix = "leave CD and GRDSET out and write the matrices again"
         raise InputError("directions of nodes are turned", where, measured, "directions x, y, z at every node", fix)
-    cards = bulk.rdcards(str(path), JOINS, regex=True, return_var="list", keep_name=True, no_data_return=[])
+    cards = bulk.rdcards(deck, JOINS, regex=True, return_var="list", keep_name=True, no_data_return=[])
     joins = Constraints(joins=str(cards[0][0]) if cards else "")
     return Nodes(numbers, places[:, 0], where, constraints=joins)
 
 
-def _check_cards(cards: Sequence[Sequence[object]], path: Path) -> None:
+def _check_cards(cards: Sequence[Sequence[object]], where: str, ends: bool) -> None:
     """Fields that are no numbers would be read as zero; what is blank is (Quick Reference Guide, GRID)."""
-    where, expected = display(path), "GRID, number, system, x, y, z"
+    expected = "GRID, number, system, x, y, z"
     for card in cards:
-        wrong = [field for field in card[:5] if isinstance(field, str) and field]
+        wrong = [field for field in card[:5] if isinstance(field, str) and field] or card[8:]
         if wrong:
             measured = f"{wrong[0]} in GRID {card[0]}"
             raise InputError(
                 "a grid point has a field that is no number", where, measured, expected, "correct the field"
             )
-    ends = "ENDDATA" in path.read_text(encoding="utf-8", errors="replace").upper()
     if cards and len(cards[-1]) < 5 and not ends:
         measured, fix = f"GRID {cards[-1][0]} ends behind {len(cards[-1])} fields, no ENDDATA", "write the deck again"
         raise InputError("the deck is cut within a grid point", where, measured, expected, fix)
+
+
+def _check_order(deck: str, where: str) -> None:
+    """Rows of the matrices follow the numbers of the grid points, unless the deck says another order."""
+    if "SEQGP," in deck:
+        fix = "take SEQGP out and write the matrices again"
+        raise InputError("grid points are in an order of their own", where, "SEQGP", "the order of their numbers", fix)
 
 
 def _check_systems(grid: Sequence[Sequence[object]], cards: Sequence[Sequence[object]], where: str) -> None:

@@ -1,0 +1,122 @@
+"""Cards of a Nastran bulk data deck, whatever their fields, as lines of free fields that pyyeti reads.
+
+Rules (MSC Nastran, Quick Reference Guide, "Format of Bulk Data Entries"): a card has fields of 8 or, with ``*`` behind
+its name, of 16 columns up to column 72, or fields parted by commas; a line goes on with the card before where its first
+field is blank or begins with ``+`` or ``*``, and has a width of its own; comments and blank lines may stand between.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..errors import InputError
+from ..texts import display
+
+#: Data fields of a line by their width.
+FIELDS = {8: 8, 16: 4}
+_INCLUDE = re.compile(r"\s*INCLUDE[\s,]*([\"']?)(.*)", re.IGNORECASE | re.DOTALL)
+
+
+def flat(path: Path, wanted: re.Pattern[str]) -> str:
+    """The cards of some names, eight fields a line, and ENDDATA where the deck has it.
+
+    Raises
+    ------
+    InputError
+        A card is a copy of another or has a wrong name, there are several models, or an included file is not there.
+    """
+    cards: list[list[str]] = []
+    odd: list[tuple[str, str]] = []
+    going_on, marked = False, ""
+    for place, line in _lines(path, path.parent, ()):
+        name, fields, mark = _fields(line)
+        if name.startswith("BEGIN"):
+            _check_one_model(place, line)
+            cards, odd, going_on = [], [], False
+        elif name == "ENDDATA":
+            cards.append([name])
+            break
+        elif name[:1] not in ("", "+", "*"):
+            known = wanted.match(name)
+            going_on = known is not None and name[known.end() :].strip() in ("", "*")
+            cards += [[known[0], *fields]] if known and going_on else []
+            odd += [(place, line)] if name.startswith("=") or (known and not going_on and "=" not in line) else []
+        elif going_on:
+            _check_mark(place, line, marked, name)
+            cards[-1] += fields
+        marked = mark
+    for place, line in odd[:1]:
+        expected, fix = "a name and fields of 8 or 16 columns, or with commas", "write each card out"
+        raise InputError("a card is a copy of another, or has a wrong name", place, line.strip(), expected, fix)
+    return _text(cards)
+
+
+def _lines(path: Path, root: Path, above: tuple[Path, ...]) -> Iterator[tuple[str, str]]:
+    """File and line, and text of each line that is no comment, with those of included files."""
+    lines = iter(enumerate(path.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1))
+    for count, given in lines:
+        line, place = given.partition("$")[0].expandtabs(), f"{display(path)}:{count}"
+        found = _INCLUDE.match(line)
+        if found is None:
+            if line.strip():
+                yield place, line
+            continue
+        quote, name = found[1], found[2]
+        while quote and quote not in name and (more := next(lines, None)):
+            name = name.rstrip() + more[1].strip()
+        name = name.partition(quote)[0] if quote else name.strip()
+        yield from _lines(_included(name, path, root, (*above, path.resolve()), place), root, (*above, path.resolve()))
+
+
+def _included(name: str, path: Path, root: Path, above: tuple[Path, ...], place: str) -> Path:
+    """Beside the file that names it, or from the folder of the first one."""
+    found = next((folder / name for folder in (path.parent, root) if (folder / name).is_file()), None)
+    if found is None:
+        raise InputError("an included file does not exist", place, name, None, "put the file beside the deck")
+    if found.resolve() in above:
+        raise InputError("a file includes itself", place, name, "another file", "remove the line")
+    return found
+
+
+def _width(line: str) -> int:
+    """Columns of a field, told by a star in the first one."""
+    return 16 if "*" in (line.partition(",")[0] if "," in line else line[:8]) else 8
+
+
+def _fields(line: str) -> tuple[str, list[str], str]:
+    """First field, in capitals, data fields, and the mark at the end by which the next line goes on."""
+    width = _width(line)
+    most = FIELDS[width]
+    if "," in line:
+        name, *fields = [word.strip() for word in line.split(",")]
+    else:
+        name, fields = line[:8].strip(), [line[k : k + width].strip() for k in range(8, len(line[:72].rstrip()), width)]
+        fields += [""] * (most - len(fields)) + [line[72:80].strip()]
+    fields += [""] * (most - len(fields))
+    return name.upper(), fields[:most], "".join(fields[most : most + 1])
+
+
+def _check_one_model(place: str, line: str) -> None:
+    if "=" in line:
+        what, fix = "the deck has several models", "give a deck of the model alone"
+        raise InputError(what, place, line.strip(), "BEGIN BULK once", fix)
+
+
+def _check_mark(place: str, line: str, marked: str, name: str) -> None:
+    """Lines that go on somewhere else are not looked for."""
+    before, now = (word.lstrip("+*").strip().upper() for word in (marked, name))
+    if before and now and before != now:
+        what, fix = "a line does not go on with the card before", "put it behind its card"
+        raise InputError(what, place, line.strip(), f"a line that begins with {marked}", fix)
+
+
+def _text(cards: list[list[str]]) -> str:
+    """Without the blank fields at their ends."""
+    lines = []
+    for name, *fields in cards:
+        while fields and not fields[-1]:
+            fields.pop()
+        lines += [",".join(["+" if k else name, *fields[k : k + 8]]) for k in range(0, max(1, len(fields)), 8)]
+    return "\n".join([*lines, ""])
