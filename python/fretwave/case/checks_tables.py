@@ -83,16 +83,25 @@ def check_preload(source: Source, section: PreloadSection | None, loads: Sequenc
 
 
 def implied_preload(source: Source, contacts: Sequence[Contact], notes: list[str]) -> PreloadSection | None:
-    """Of a case without [preload]: normal loads given pair by pair are in balance as they are, which is noted.
+    """Of a case without [preload]: pairs that press by themselves are in balance as they are, which is noted.
 
-    Only of laws with a memory; others may be integrated in time, which knows no preload.
+    Only of laws with a memory; others may be integrated in time, which knows no preload: they move the structure.
     """
-    loaded = [c for c in contacts if c.info.memory and c.value(Role.LOAD) is not None and np.any(c.value(Role.LOAD))]
-    if "preload" in source.data or not loaded:
-        return None
-    notes += [
-        f"contact '{contact.name}': its {contact.info.named(Role.LOAD)} is taken as balanced, for there is no"
-        " [preload]; `[preload] balanced = false` lets it move the structure"
-        for contact in loaded
-    ]
-    return PreloadSection()
+    pressing = {} if "preload" in source.data else {c.name: what for c in contacts if (what := _pressing(c))}
+    kept = [c.name for c in contacts if c.info.memory and c.name in pressing]
+    for name, what in pressing.items():
+        said = f"contact '{name}': its {what}"
+        if kept:
+            said += " is taken as balanced, for there is no [preload]; `[preload] balanced = false` lets it move the"
+            notes.append(f"{said} structure")
+        elif what.startswith("gap"):
+            notes.append(f"{said} moves the structure, for there is no [preload], which takes it as balanced")
+    return PreloadSection() if kept else None
+
+
+def _pressing(contact: Contact) -> str:
+    """What presses a contact's pairs without displacement, in words."""
+    load, gap = contact.value(Role.LOAD), contact.value(Role.GAP)
+    if load is not None and np.any(load):
+        return str(contact.info.named(Role.LOAD))
+    return "" if gap is None or np.min(gap, initial=0.0) >= 0 else f"{contact.info.named(Role.GAP)} (an interference)"

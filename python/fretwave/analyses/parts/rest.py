@@ -52,7 +52,7 @@ def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Rest]:
 
 
 def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0) -> Rest:
-    """The same also without [preload], where the pairs' own loads act alone. Collective.
+    """The same also without [preload], where what pairs press with by themselves moves the structure. Collective.
 
     Parameters
     ----------
@@ -61,9 +61,9 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
     """
     from ...solve.preload import balanced, static_preload
 
-    section = context.case.preload_of(context.analysis)
+    section = context.case.preload_of(context.analysis) or PreloadSection(balanced=False)
     reference = closed_mode(context)
-    if section is None or (not section.loads and (section.balanced or not pressed(context.case.contacts, section))):
+    if not section.loads and (section.balanced or not pressed(context.case.contacts, section)):
         return balanced(context.model, reference)
     given = [context.case.loads[name] for name in section.loads]
     load = factor * np.sum([np.zeros(context.model.n_dof), *given], axis=0)
