@@ -79,3 +79,13 @@ def test_a_change_of_sign_without_a_point_at_zero_leaves_no_hole_in_the_words(ze
     columns = {"nodal_diameter": np.ones(3), "amplitude": np.array([1.0, 2.0, 3.0]), "zeta": np.array(zeta)}
     (wave,) = describe_waves({**columns, "frequency_hz": np.full(3, 10.0), "event": np.full(3, "")}, [1])
     assert said in words(wave, "m")
+
+
+@pytest.mark.ranks(1)
+def test_a_branch_that_stopped_early_says_nothing_of_what_is_beyond():
+    """A limit cycle may be there: friction was called never to make up for the flow."""
+    columns = {"nodal_diameter": np.ones(2), "amplitude": np.array([1.0, 2.0]), "zeta": np.array([-0.01, -0.01])}
+    (wave,) = describe_waves({**columns, "frequency_hz": np.full(2, 10.0), "event": np.full(2, "")}, [1])
+    said, to_the_end = words(wave, "m", stopped=True), words(wave, "m")
+    assert said.startswith(to_the_end) and "never" not in said
+    assert "stopped early, at most 2 m: what is beyond is not known" in said and "stopped" not in to_the_end

@@ -175,7 +175,8 @@ def _all_waves(
     writer.close(status, reason, events=json.dumps(cycles), waves=json.dumps(waves), **ended)
     context.entry["waves"] = waves
     unit = context.units("length")
-    summary = [f"{context.name}: {words(wave, unit)}" for wave in waves]
+    early = {diameters[number] for number in stopped}
+    summary = [f"{context.name}: {words(wave, unit, wave['nodal_diameter'] in early)}" for wave in waves]
     goal = f"amplitude {context.analysis.amplitude[1]:g} {unit} in every wave"
     advice = what_to_do(context.name, cannot, diameters)
     return Outcome(writer.rows, reason, not stopped, summary, goal, advice)

@@ -89,22 +89,23 @@ def verdict(zeta: npt.ArrayLike, top: int = -1) -> str:
     return "bounded" if (at_top > 0).any() else "bounded below"
 
 
-def words(wave: Mapping[str, Any], unit: str) -> str:
-    """A wave's fate in one line; `unit` of its amplitudes."""
+def words(wave: Mapping[str, Any], unit: str, stopped: bool = False) -> str:
+    """A wave's fate in one line; `unit` of its amplitudes. `stopped`: its branch did not come to its end."""
     cycles = "; ".join(_cycle(cycle, unit) for cycle in wave["limit_cycles"]) or NOT_LOCATED
     peak = f"largest damping {100 * wave['largest_zeta']:+.3g} % at a = {wave['at_amplitude']:.3g} {unit}"
     last = f"{wave['last_amplitude']:.3g} {unit}"
     fate = {
         "neutral": "neither damped nor fed",
         "stable": f"stable at every amplitude up to {last}",
-        "unbounded": f"grows at every amplitude up to {last}, friction never makes up for the flow: {peak}",
+        "unbounded": f"grows at every amplitude up to {last}, friction does not make up for the flow there: {peak}",
         "bounded": f"{cycles}; {peak}",
         "bounded below": f"{cycles}, growth without bound beyond; {peak}",
         "stable below": f"decays below, {cycles}; {peak}",
     }[wave["verdict"]]
     first = 100 * without_rounding(wave["zeta"])
     stuck = f"{wave['frequency_hz']:.5g} Hz, {first:+.3g} % at the smallest amplitude"
-    return f"ND {with_sign(wave['nodal_diameter'])}, {stuck}: {fate}"
+    beyond = f" (the branch stopped early, at most {last}: what is beyond is not known)" if stopped else ""
+    return f"ND {with_sign(wave['nodal_diameter'])}, {stuck}: {fate}{beyond}"
 
 
 def with_sign(diameters: int) -> str:
