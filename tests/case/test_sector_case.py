@@ -143,3 +143,20 @@ def test_a_sector_is_not_integrated_in_time(write):
     decay = '\n[[analysis]]\nname = "decay"\ntype = "free_decay"\nmode = "mode"\namplitude = [1e-5]\nperiods = 5\n'
     with pytest.raises(CaseErrors, match="integrates in time"):
         load_case(write(("amplitude = [1e-5, 1e-4]\n", "amplitude = [1e-5, 1e-4]\n" + decay)))
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("kind", ["free_decay", "limit_cycle", "forced"])
+def test_nor_is_a_whole_wheel_and_the_words_fit_it(write, kind):
+    """They spoke of one sector alone, and of nothing to remove but a key that is needed."""
+    wheel = "wheel = true\nnormalise"
+    more = 'mode = "mode"\namplitude = [1e-5]\nperiods = 100\n'
+    if kind == "forced":
+        more = 'backbone = ["mode"]\nnodal_diameter = -4\nwheel = true\nforce = { tip = 1.0 }\nobserve = "tip"\n'
+        more += "levels = [1.0]\nfrequency = [600.0, 700.0]\nharmonics = 1\ntime_points = 1\n"
+    analysis = f'\n[[analysis]]\nname = "other"\ntype = "{kind}"\n{more}'
+    with pytest.raises(CaseErrors) as caught:
+        load_case(write(("normalise", wheel), ("1e-4]\n", "1e-4]\n" + analysis)))
+    (found,) = [one for one in caught.value.problems if one.what.startswith("other ")]
+    assert "integrates in time" in found.what and found.what.endswith("one sector or the whole wheel")
+    assert found.fix == ("write `time_points = 0`" if kind == "forced" else "remove the analysis")

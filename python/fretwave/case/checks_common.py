@@ -88,7 +88,8 @@ def _check_time_integration(report: Reporter, analysis: AnalysisSection, key: st
         what, expected = "needs time integration, which does not know a preload", "analyses of harmonic balance"
         report.wrong((key,), what, expected, f"remove the analysis, or {loaded}" if whole else f"write `{key} = 0`")
     if facts.model_known and facts.neighbours is not None:
-        about(report, key, "integrates in time, which one sector cannot", "harmonic balance", "remove it")
+        what = "integrates in time, which a model of sectors cannot, be it one sector or the whole wheel"
+        about(report, key, what, "harmonic balance", "remove the analysis" if whole else f"write `{key} = 0`")
     named = next((c for c in facts.contacts if getattr(facts.laws.get(str(c.law)), "memory", False)), None)
     if named is not None:
         report.wrong(
