@@ -358,6 +358,19 @@ def test_limit_cycles_hold_the_motions_and_stand_where_damping_is_zero(tmp_path)
     np.testing.assert_allclose(plane.lines[0].get_xydata(), history[1:].T)
 
 
+def test_a_predicted_orbit_has_the_mean_of_the_static_state(tmp_path):
+    """It grew with the amplitude to which the nearest point is scaled."""
+    writer = AnalysisWriter(tmp_path, "mode", MODE, {"type": "mode", "normalise": "m"}, ["m"], ["0", "1c", "1s"])
+    for point, a in enumerate((0.5, 2.0)):
+        row = {"point": point, "amplitude": a, "omega": 3.0, "omega0": 3.0, "frequency_hz": 0.5, "beta": 0.0}
+        writer.append({**row, **SHARED, "zeta": 0.01 * (a - 1.0)}, np.array([[7.0, a, 0.0]]))
+    writer.close("done", "")
+    found = Run(tmp_path)["mode"]
+    (zero,) = found.mode_curve().crossings()
+    ((_, x, v),) = limit_cycles.predicted_orbits(found)
+    np.testing.assert_allclose(np.hypot(x - 7.0, v / 3.0), zero.amplitude, rtol=SOLVED)
+
+
 def test_envelopes_that_end_early_have_the_word_of_their_summary(tmp_path):
     writer = AnalysisWriter(tmp_path, "mode", MODE, {"type": "mode", "method": "CNM", "normalise": "m"})
     for point, a in enumerate(np.geomspace(0.05, 2.0, 9)):

@@ -110,12 +110,16 @@ def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
 
 
 def predicted_orbits(mode: Analysis) -> list[tuple[Optional[bool], AnyArray, AnyArray]]:
-    """Closed orbits of the normalised dof at the zeros of the damping, from the nearest point scaled to the zero."""
-    orbits = []
+    """Closed orbits of the normalised dof at the zeros of the damping, from the nearest point scaled to the zero.
+
+    Its mean is as it is there: that of a static state has nothing to do with the amplitude.
+    """
+    orbits, moves = [], np.array([label != "0" for label in mode.labels], dtype=bool)
     for crossing in mode.mode_curve().crossings() if mode.labels else []:
         away = np.abs(mode.columns["amplitude"] / crossing.amplitude - 1.0) + np.abs(mode.columns["zeta"])
         point = int(np.argmin(away))
-        coefficients = mode.coefficients([point])[0] * crossing.amplitude / mode.columns["amplitude"][point]
+        factor = np.where(moves, crossing.amplitude / mode.columns["amplitude"][point], 1.0)
+        coefficients = mode.coefficients([point])[0] * factor
         x, v = motion(mode.labels, coefficients, 0.0, crossing.omega)
         orbits.append((crossing.stable, mode.along(x), mode.along(v)))
     return orbits
