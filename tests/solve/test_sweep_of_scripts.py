@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 
 import numpy as np
@@ -11,6 +12,7 @@ from tolerances import REPEATED, ROUNDING, SOLVED
 import fretwave as fw
 
 KT, K = 5.0, 40.0
+COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "of a list": lambda one: copy.deepcopy([one, one])[1]}
 
 
 def backbone(limit, mass=1.0, comm=None):
@@ -57,6 +59,19 @@ def test_a_branch_travels_without_its_unknowns(comm):
     np.testing.assert_array_equal(there.at(0.7)["zeta"], branch.at(0.7)["zeta"])
     with pytest.raises(fw.InputError, match="no unknowns"):
         there.unknowns(0)
+
+
+@pytest.mark.parametrize("made", COPIES.values(), ids=COPIES)
+def test_a_copy_of_a_branch_has_its_unknowns(comm, made):
+    """Those of `pickle`, which has no ranks, were lost without a word."""
+    branch = backbone(1.0, comm=comm)
+    place = float(branch.at(0.7)["place"][0])
+    other = made(branch)
+    np.testing.assert_array_equal(other.at(0.7)["zeta"], branch.at(0.7)["zeta"])
+    assert other is not branch and other.problem is branch.problem and other.events == branch.events
+    np.testing.assert_array_equal(other.shape(place), branch.shape(place))
+    other.reason = "another"
+    assert branch.reason != "another"
 
 
 def test_shape_is_the_complex_fundamental(comm):

@@ -5,6 +5,7 @@ Neither PETSc nor MPI is needed to read one.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -177,6 +178,19 @@ class Branch(Table):
     def __getstate__(self) -> dict[str, Any]:
         """Unknowns stay where they are: a branch travels between ranks without them."""
         return {**self.__dict__, "_unknowns": None, "_comm": None}
+
+    def __copy__(self) -> Branch:
+        """On the same rank: with the unknowns."""
+        other = type(self).__new__(type(self))
+        other.__dict__.update({name: value for name, value in self.__dict__.items() if name != "_curve"})
+        return other
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Branch:
+        """Unknowns, which nobody changes, and their problem are those of this one."""
+        other = copy.copy(self)
+        memo.update({id(self): other, id(self._unknowns): self._unknowns, id(self._comm): self._comm})
+        other.__dict__.update(copy.deepcopy(other.__dict__, memo))
+        return other
 
     def plot(self) -> Figure:
         """Frequency and damping over amplitude of a mode, amplitude and phase over frequency of a response.
