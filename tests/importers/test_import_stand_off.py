@@ -10,6 +10,7 @@ import pytest
 import test_import_at_rest as blocks
 from test_import_at_rest import KINDS, LENGTH, Block, N, ccx, heights, pressures, static_step, table
 
+import fretwave as fw
 from fretwave.importers.stand_off import StandOff, of_sides, read_stand_off
 
 pytestmark = blocks.pytestmark
@@ -33,11 +34,11 @@ def imported(folder: Path, results: Path) -> dict[str, np.ndarray]:
     return table(folder / "blocks_face.csv")
 
 
-def apart(results: Path, found: dict[str, np.ndarray], begins: float) -> np.ndarray:
+def apart(results: Path, found: dict[str, np.ndarray], begins: float | np.ndarray) -> np.ndarray:
     """Of both nodes of each pair in the end, by their places."""
     text = results.read_text()
     u = heights(text[text.rindex(" -4  DISP") :])
-    return np.array([begins + u[b] - u[a] for a, b in zip(found["node_a"], found["node_b"])])
+    return begins + np.array([u[b] - u[a] for a, b in zip(found["node_a"], found["node_b"])])
 
 
 @pytest.mark.parametrize(
@@ -83,17 +84,41 @@ def test_pairs_that_the_results_leave_out_are_open_by_their_places(standing_off,
     assert found["gap"][opening] == pytest.approx(far[opening], rel=1e-2)
 
 
+@pytest.mark.parametrize("beyond", [False, True], ids=["alone", "with nodes beyond"])
+def test_nodes_of_a_set_alone_begin_on_the_other_side(beyond, standing_off, tmp_path):
+    """Those beside them began there as well; nodes of the set that are no dependent ones are not moved."""
+    standing_off(APART)
+    near = [n for (i, _, k), n in blocks.LOWER.number.items() if k and i <= N // 2]
+    near += [int(n) for n in blocks.UPPER.layer(0)] if beyond else []
+    text = static_step("node").replace(KINDS["node"], f"{KINDS['node']}, ADJUST=Near")
+    text = text.replace("*SURFACE, NAME=A", "\n".join(["*NSET, NSET=NEAR", *map(str, near), "*SURFACE, NAME=A"]))
+    results = ccx(tmp_path, "static", text).with_suffix(".frd")
+    found = imported(tmp_path, results)
+    far = apart(results, found, np.where(np.isin(found["node_a"], near), 0.0, APART))
+    opening = found["normal_load"] == 0
+    assert (far[opening] > 1e-5).all() and np.count_nonzero(opening) >= N
+    assert found["gap"] == pytest.approx(np.where(opening, far, 0.0), rel=1e-2)
+
+
 def test_what_a_deck_says_of_the_distance(tmp_path):
     """By the names of both sides, in whatever order; of a single contact whatever its names are."""
     deck = tmp_path / "static.inp"
+    nodes = "*NODE\n" + "".join(f"{n}, {n}, 0, 0\n" for n in range(1, 7)) + "*NSET, NSET=NEAR\n1, 2, 5\n"
+    nodes += "".join(f"*SURFACE, NAME={name}, TYPE=NODE\n{n}\n{n + 1}\n" for name, n in (("A", 1), ("E", 3)))
     deck.write_text(
-        "*CONTACT PAIR, INTERACTION=DRY, ADJUST=Near\na, b\nE, F\n*CONTACT PAIR, INTERACTION=DRY, ADJUST=0.5\nC, D\n"
+        f"{nodes}*CONTACT PAIR, INTERACTION=DRY, ADJUST=Near\na, b\nE, F\n"
+        "*CONTACT PAIR, INTERACTION=DRY, ADJUST=0.5\nC, D\n"
         "*CONTACT PAIR, INTERACTION=DRY\nG, H\n*CLEARANCE, SLAVE=G, MASTER=H, VALUE=0.25\n"
     )
     known, mesh = read_stand_off(deck), np.array([-1.0, 0.4, 0.6])
-    assert of_sides(known, ("B", "A")).of(mesh).tolist() == of_sides(known, ("E", "F")).of(mesh).tolist() == [0.0] * 3
-    assert of_sides(known, ("C", "D")).of(mesh).tolist() == [0.0, 0.0, 0.6]
-    assert of_sides(known, ("G", "H")).of(mesh).tolist() == [0.25] * 3
-    assert of_sides(known, ("I", "J")).of(mesh).tolist() == mesh.tolist()
-    assert of_sides({("A", "B"): StandOff(0.5)}, ("I", "J")).of(mesh).tolist() == [0.0, 0.0, 0.6]
+    pairs = np.array([[4, 1], [3, 9], [9, 2]])
+    assert of_sides(known, ("B", "A")).of(mesh, pairs).tolist() == [0.0, 0.4, 0.0]
+    assert of_sides(known, ("E", "F")).of(mesh, pairs).tolist() == mesh.tolist()
+    assert of_sides(known, ("C", "D")).of(mesh, pairs).tolist() == [0.0, 0.0, 0.6]
+    assert of_sides(known, ("G", "H")).of(mesh, pairs).tolist() == [0.25] * 3
+    assert of_sides(known, ("I", "J")).of(mesh, pairs).tolist() == mesh.tolist()
+    assert of_sides({("A", "B"): StandOff(0.5)}, ("I", "J")).of(mesh, pairs).tolist() == [0.0, 0.0, 0.6]
     assert not read_stand_off(tmp_path / "none.inp")
+    deck.write_text(deck.read_text().replace("ADJUST=Near", "ADJUST=Nearest"))
+    with pytest.raises(fw.InputError, match="(?s)no node set 'Nearest'.*fix:"):
+        read_stand_off(deck)

@@ -87,7 +87,7 @@ class StaticStep:
     def begins_at(self, pairs: Pairs, sides: Sequence[str]) -> Array:
         """How far the sides of each pair are apart as the step begins (n_pairs,) [length], below zero they overlap."""
         mesh = np.zeros(pairs.n_pairs) if pairs.clearance is None else np.asarray(pairs.clearance)
-        return self._told(sides).of(mesh)
+        return self._told(sides).of(mesh, np.asarray(pairs.nodes))
 
     def springs_of_nodes(self, sides: Sequence[str]) -> bool:
         """The pressures are those of springs at nodes that the deck names without faces."""

@@ -3,7 +3,8 @@
 Displacements alone do not say how far a pair is open in the end where its sides stand off, or overlap, in the mesh: a
 joint with clearance, a shrink fit. The step's deck may change that (G. Dhondt, CalculiX CrunchiX User's Manual,
 *CONTACT PAIR and *CLEARANCE): with ADJUST nodes that are no farther off begin on the other side, whereof the results
-hold no displacement, and *CLEARANCE puts its VALUE in place of the mesh's distance.
+hold no displacement, or those of a node set however far they are, and *CLEARANCE puts its VALUE in place of the mesh's
+distance.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from typing import Optional, TypeVar
 
 import numpy as np
 
-from ..arrays import Array
-from .keywords import Lines, blocks
+from ..arrays import Array, IntArray
+from .keywords import Lines, blocks, number
+from .nodes import Nodes, read_nodes
+from .surfaces import side_of
 
 #: Names of a contact's dependent and independent surface, capital letters.
 Sides = tuple[str, str]
@@ -30,7 +33,8 @@ class StandOff:
 
     Attributes
     ----------
-    adjusted : what is as far apart begins at zero [length]; of a node set inf
+    adjusted : what is as far apart begins at zero [length]
+    nodes : those of the dependent surface that begin at zero however far they are
     value : in place of the mesh's distance [length]
     of_nodes : the dependent surface is one of nodes (``*SURFACE, TYPE=NODE``)
     at_nodes : the contact is from node to surface
@@ -40,12 +44,14 @@ class StandOff:
     value: Optional[float] = None
     of_nodes: bool = False
     at_nodes: bool = False
+    nodes: frozenset[int] = frozenset()
 
-    def of(self, clearance: Array) -> Array:
-        """The distances (n,) with which the step begins, from those of the mesh [length]."""
+    def of(self, clearance: Array, nodes: IntArray) -> Array:
+        """The distances (n,) with which the step begins, from those of the mesh [length]; nodes (n, 2) of the pairs."""
         if self.value is not None:
             return np.full(len(clearance), self.value)
-        return np.where(clearance > self.adjusted, clearance, 0.0)
+        moved = (clearance <= self.adjusted) | np.isin(nodes, list(self.nodes)).any(axis=1)
+        return np.where(moved, 0.0, clearance)
 
 
 def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
@@ -61,12 +67,27 @@ def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
                 values[options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()] = float(options["VALUE"])
         elif keyword == "SURFACE" and options.get("TYPE", "").upper() == "NODE":
             nodal.add(options.get("NAME", "").upper())
-    return {sides: _stand_off(options, values.get(sides), sides[0] in nodal) for sides, options in pairs.items()}
+    return {
+        sides: _stand_off(deck, sides[0], options, values.get(sides), sides[0] in nodal)
+        for sides, options in pairs.items()
+    }
 
 
-def _stand_off(options: Mapping[str, str], value: Optional[float], of_nodes: bool) -> StandOff:
-    at_nodes = options.get("TYPE", "").upper().startswith("NODE")
-    return StandOff(_adjusted(options.get("ADJUST", "")), value, of_nodes, at_nodes)
+def _stand_off(
+    deck: Path, dependent: str, options: Mapping[str, str], value: Optional[float], of_nodes: bool
+) -> StandOff:
+    at_nodes, adjust = options.get("TYPE", "").upper().startswith("NODE"), options.get("ADJUST", "")
+    try:
+        return StandOff(number(adjust) if adjust else -np.inf, value, of_nodes, at_nodes)
+    except ValueError:
+        nodes = frozenset(_in_both(read_nodes(deck), adjust, dependent))
+        return StandOff(-np.inf, value, of_nodes, at_nodes, nodes)
+
+
+def _in_both(mesh: Nodes, node_set: str, surface: str) -> list[int]:
+    """Nodes of a set that lie on a surface: those beyond are not moved."""
+    found: list[int] = np.intersect1d(mesh.node_set(node_set), side_of(mesh, surface).numbers).tolist()
+    return found
 
 
 def of_sides(known: Mapping[Sides, StandOff], sides: Sequence[str]) -> StandOff:
@@ -86,12 +107,3 @@ def _sides(data: Lines) -> list[Sides]:
     """Of the lines of a ``*CONTACT PAIR``: dependent, independent surface."""
     found = [[word.strip().upper() for word in text.split(",")] for _, text in data]
     return [(words[0], words[1]) for words in found if len(words) > 1]
-
-
-def _adjusted(text: str) -> float:
-    """The size that ADJUST names, of a node set inf."""
-    if not text:
-        return -np.inf
-    with suppress(ValueError):
-        return float(text)
-    return np.inf
