@@ -7,7 +7,7 @@ import pytest
 
 from fretwave.post.fatigue import EQUAL
 from fretwave.post.largest import as_large, largest
-from fretwave.post.mode_curve import lowest, most_damped
+from fretwave.post.mode_curve import lowest, most_damped, varies
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -40,3 +40,13 @@ def test_values_that_are_not_known_are_left_out(unknown: float) -> None:
     assert largest(values) == most_damped(values) == 2 and lowest(values) == 1
     assert not as_large(values)[[0, 3]].any()
     assert largest(values[[0, 3]]) == most_damped(values[[0, 3]]) == lowest(values[[0, 3]]) == 0
+
+
+@pytest.mark.parametrize(("left", "expected"), [(0.0, True), (1e-12, True), (1e-10, False), (np.nan, True)])
+def test_damping_that_the_solver_left_to_itself_does_not_vary(left: float, expected: bool) -> None:
+    """A place of the largest was named where a looser solver had scattered it by more than rounding."""
+    zeta = 0.01 + 1e-10 * np.sin(np.arange(20.0))
+    assert varies({"zeta": zeta})
+    table = {"zeta": zeta, "omega0": np.full(20, 50.0), "lambda_error_solver": np.full(20, 50.0 * left)}
+    assert varies(table) is expected
+    assert not varies(table, slice(3, 4)) and varies({**table, "zeta": zeta + 1e-9 * np.arange(20)})

@@ -272,7 +272,7 @@ def _percent(value: float, digits: int) -> str:
 def summarise(name: str, table: Mapping[str, Any], cycles: Sequence[Mapping[str, Any]], unit: str) -> list[str]:
     """The branch in a line, and a line for each limit cycle."""
     amplitude, zeta = table["amplitude"], table["zeta"]
-    top, changes = most_damped(zeta), varies(zeta)
+    top, changes = most_damped(zeta), varies(table)
     folds = sum("fold" in event.split() for event in table["event"])
     lines = [
         f"{name}: {len(zeta)} points, a {min(amplitude):.4g} to {max(amplitude):.4g} {unit},"

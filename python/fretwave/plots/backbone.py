@@ -192,7 +192,7 @@ def peak_point(mode: Analysis) -> int:
 
 def is_peak(mode: Analysis, point: int) -> bool:
     """Not where the branch ends with damping still growing, or where damping does not change."""
-    return varies(mode.columns["zeta"]) and 0 < point < len(mode) - 1
+    return varies(mode.columns) and 0 < point < len(mode) - 1
 
 
 def _name(mode: Analysis, scale: Scale) -> str:
@@ -201,7 +201,7 @@ def _name(mode: Analysis, scale: Scale) -> str:
     zeta, amplitude = mode.columns["zeta"][point], mode.columns["amplitude"][point]
     zeta = 100.0 * without_rounding(zeta)
     name = f"{mode.method()}, {_harmonics(mode)}:"
-    if not varies(mode.columns["zeta"]):
+    if not varies(mode.columns):
         return f"{name} ζ {zeta:.3g} % throughout"
     return f"{name} {'peak' if is_peak(mode, point) else 'up to'} ζ {zeta:.3g} % at {scale.text(amplitude)}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
@@ -32,9 +32,13 @@ def most_damped(zeta: Array) -> int:
     return largest(zeta, least=LEAST_DAMPING)
 
 
-def varies(zeta: Array) -> bool:
-    """Damping changes along a branch by more than rounding."""
-    return most_damped(zeta) != most_damped(-zeta)
+def varies(table: Mapping[str, Any], rows: Any = slice(None)) -> bool:
+    """Damping changes along some rows of a branch by more than rounding, and than its solver left of it."""
+    zeta, left = np.asarray(table["zeta"])[rows], np.zeros(1)
+    if "lambda_error_solver" in table and "omega0" in table:
+        left = (np.asarray(table["lambda_error_solver"]) / np.asarray(table["omega0"]))[rows]
+    known, bound = zeta[np.isfinite(zeta)], float(left.max(where=np.isfinite(left), initial=0.0))
+    return most_damped(zeta) != most_damped(-zeta) and bool(np.ptp(known) > 2.0 * bound)
 
 
 def without_rounding(zeta: float) -> float:

@@ -134,7 +134,7 @@ def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
             yield int(rows[slips[0] - 1]), "last before any slip"
             yield int(rows[slips[0]]), "first with slip"
     top = peak_row(columns, rows)
-    if top is not None and ("level" in columns or varies(columns["zeta"][rows])):
+    if top is not None and ("level" in columns or varies(columns, rows)):
         yield top, "largest damping" if "zeta" in columns else f"largest amplitude{whose_amplitude(columns)}"
     for name in ("normal_force", "tangential_force") if "level" not in columns else ():
         # of a law without a normal direction none is known, of one without friction all are zero

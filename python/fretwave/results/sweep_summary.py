@@ -196,7 +196,7 @@ def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]
         "slip_from": float(amplitude[first]) if len(slips) else np.nan,
         "onset_amplitude": _onset(table, float(zeta[0]), float(zeta[top])) if first and rises else np.nan,
         "largest_zeta": float(zeta[top]),
-        "amplitude_of_largest_zeta": float(amplitude[top]) if varies(zeta) else np.nan,
+        "amplitude_of_largest_zeta": float(amplitude[top]) if varies(table) else np.nan,
         "lowest_frequency_hz": float(frequency[low]),
         "amplitude_of_lowest_frequency": float(amplitude[low]) if 0 < low < len(zeta) - 1 else np.nan,
         "last_frequency_hz": float(frequency[-1]),
