@@ -258,8 +258,10 @@ def _summary(context: AnalysisContext[LinearAnalysis], rows: Sequence[Mapping[st
         own = [row for row in rows if row["contact"] == limit]
         waves = len({row["nodal_diameter"] for row in own})
         over = f" in {counted(waves, 'wave')}" if context.case.neighbours else ""
-        low, high = (end(row["frequency_hz"] for row in own) for end in (min, max))
-        lines.append(f"{context.name}: {limit}: {counted(len(own), 'mode')}{over}, {low:.6g} to {high:.6g} Hz")
+        elastic = [row["frequency_hz"] for row in own if row["frequency_hz"] > 0.0]
+        rigid = f", {len(own) - len(elastic)} rigid at 0 Hz" if len(elastic) < len(own) else ""
+        to = f", {min(elastic):.6g} to {max(elastic):.6g} Hz" if elastic else ""
+        lines.append(f"{context.name}: {limit}: {counted(len(own), 'mode')}{over}{rigid}{to}")
     return lines
 
 

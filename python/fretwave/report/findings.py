@@ -125,7 +125,10 @@ def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
     # Linear modes: those of the first limit have beside them what they become.
     if "contact" in analysis.words and "mode" in columns:
         own = rows[analysis["contact"][rows] == analysis["contact"][0]]
-        yield from ((int(row), f"{analysis['contact'][row]}, mode {columns['mode'][row]:.0f}") for row in own)
+        rigid = np.where(columns["frequency_hz"] == 0.0, ", rigid", "")
+        yield from (
+            (int(row), f"{analysis['contact'][row]}, mode {columns['mode'][row]:.0f}{rigid[row]}") for row in own
+        )
         return
     yield int(rows[0]), "first row"
     if "slip" in columns and "amplitude" in columns:

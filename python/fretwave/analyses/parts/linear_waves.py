@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 #: A mode below this share of the highest is a rigid motion: no engine order meets it.
 RIGID = 1e-6
+#: Of the highest omega^2 what solvers leave where there is none: measured up to 2.5 eps, of 250 loose structures.
+ROUNDING = 4 * float(np.finfo(float).eps)
 #: Of a crossing, after what tells its mode.
 CROSSING = ("engine_order", "speed_rpm", "frequency_hz", "margin")
 
@@ -110,6 +113,7 @@ def _modes(
                 raise
             context.console.line(f"{context.name}: contact that sticks leaves nothing to move")
             return []
+    modes = without_rounding(modes, case.structure.K, sector_phase(context.case, diameters))
     told = _count(context) if sought else count
     last = int(planes_of(modes)[-1][0]) if len(modes) > count else count  # of which others may be left out
     return in_damped_basis(modes, C, sector_phase(context.case, diameters))[: max(told, last)]
@@ -125,6 +129,22 @@ def _with_their_planes(model: Model, count: int) -> list[LinearMode]:
         modes = linear_modes(model, asked)
         if len(modes) < asked or asked == model.n_dof or planes_of(modes)[-1][0] >= count:
             return modes
+
+
+def without_rounding(modes: Sequence[LinearMode], K: Optional[Term], theta: float = 0.0) -> list[LinearMode]:
+    """The same modes, at zero those whose frequency is what rounding left of the others'; theta of a sector's wave.
+
+    Their omega^2 are below some eps of the highest, and not what K makes of their shape.
+    """
+    bound = ROUNDING * max((mode.omega**2 for mode in modes), default=0.0)
+    return [replace(mode, omega=0.0) if _left_by_rounding(mode, K, theta, bound) else mode for mode in modes]
+
+
+def _left_by_rounding(mode: LinearMode, K: Optional[Term], theta: float, bound: float) -> bool:
+    if K is None or not 0.0 < mode.omega**2 <= bound:
+        return False
+    phi = mode.shape + 1j * mode.imaginary
+    return float((phi.conj() @ in_wave(K, phi, theta)).real) < 0.5 * mode.omega**2
 
 
 def damping_ratio(mode: LinearMode, C: Optional[Term], theta: float = 0.0) -> float:
