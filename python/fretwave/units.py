@@ -152,7 +152,7 @@ def unit_system(name: str) -> UnitSystem:
     InputError
         There is none.
     """
-    if name not in SYSTEMS:
+    if name not in list(SYSTEMS):
         raise unknown(name)
     return SYSTEMS[name]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import CaseErrors, FretwaveError
+from ..kinds import of_their_kinds
 from ..model.contact import Contact
 from ..model.pairs import Pairs
 from ..model.structure import Structure
@@ -42,6 +43,7 @@ Table = TypeVar("Table", bound=Section)
 __all__ = ["Case", "changed_keys", "load_case"]
 
 
+@of_their_kinds
 def load_case(
     path: str | Path,
     overrides: Sequence[str] | str = (),

@@ -25,6 +25,7 @@ from mpi4py import MPI
 
 from ..arrays import Array, Indices
 from ..errors import InputError
+from ..kinds import of_their_kinds
 from ..model.contact import Contact
 from ..model.frequency_error import RIGID_SHARE
 from ..model.omitted import UNKNOWN
@@ -175,6 +176,7 @@ class SectorReduction(Destroyable):
         return full, reduced, np.where(rigid, np.nan, reduced / np.where(full > 0, full, 1.0) - 1)
 
 
+@of_their_kinds
 def reduce_sector(
     M: Given,
     K: Given,

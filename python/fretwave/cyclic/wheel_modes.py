@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays import Array, Complex
 from ..errors import InputError
 from ..given import not_negative, place, whole
+from ..kinds import of_their_kinds
 from ..model.modes import LinearMode
 from ..model.sectors import check_number, check_wave
 from ..model.wheel_matrix import Matrix, WheelMatrix
@@ -25,6 +26,7 @@ from .sector import Sector, wave_mode
 ALIKE = 1e-3
 
 
+@of_their_kinds
 def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tuple[LinearMode, Optional[Complex]]:
     """A wave of a tuned sector as a mode of the wheel, and the one that runs the other way, to be avoided.
 
@@ -43,6 +45,7 @@ def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tupl
     return phi, None if _single(nodal_diameter, sectors) else phi.shape - 1j * phi.imaginary
 
 
+@of_their_kinds
 def standing_wave(
     mode: LinearMode, nodal_diameter: int, sectors: int, dof: int, crest: int = 0
 ) -> tuple[LinearMode, Optional[Complex]]:

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..errors import InputError
 from ..given import numbers, whole, with_a_square
+from ..kinds import of_their_kinds
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
@@ -42,6 +43,7 @@ class ForcedResponse(HarmonicProblem):
 
     core: _core.ForcedResponse
 
+    @of_their_kinds
     def __init__(
         self,
         model: Model,

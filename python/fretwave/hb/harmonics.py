@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
 
 from .. import _core
 from ..errors import InputError
 from ..given import whole
+from ..kinds import of_their_kinds
 from ..model.model import Model
 from .states import default_samples
 
@@ -23,6 +24,9 @@ class Harmonics:
     """
 
     def __init__(self, orders: Sequence[int], samples: int) -> None:
+        if not isinstance(orders, Iterable) or isinstance(orders, (str, bytes)):
+            fix = "give for example [0, 1, 2, 3]"
+            raise InputError("the retained harmonics are no list", "orders", repr(orders), "whole numbers", fix)
         orders, samples = [_whole("orders", n) for n in orders], _whole("samples", samples)
         if samples > MOST_SAMPLES or max(map(abs, orders), default=0) > MOST_HARMONICS:
             measured, expected = f"{orders}, {samples} samples", f"up to {MOST_HARMONICS}, {MOST_SAMPLES} samples"
@@ -56,6 +60,7 @@ class Harmonics:
 MOST_HARMONICS, MOST_SAMPLES = 1_000_000, 2**31 - 1
 
 
+@of_their_kinds
 def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
     """Retained set up to `highest`: only what the model needs, unless told otherwise.
 

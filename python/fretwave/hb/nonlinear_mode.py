@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..kinds import of_their_kinds
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
@@ -43,6 +44,7 @@ class NonlinearMode(HarmonicProblem):
 
     core: _core.NonlinearMode
 
+    @of_their_kinds
     def __init__(
         self,
         model: Model,

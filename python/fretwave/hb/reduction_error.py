@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array, Complex
 from ..errors import InputError, NotConverged
+from ..kinds import of_their_kinds
 from ..model.reduction import Reduction
 from ..model.sectors import Sparse
 from .nonlinear_mode import NonlinearMode
@@ -48,6 +49,7 @@ class NonlinearError:
     wall_s: float
 
 
+@of_their_kinds
 def nonlinear_error(
     reduction: Reduction,
     problem: NonlinearMode,

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ..arrays import Array
 from ..errors import InputError
 from ..given import masked
+from ..kinds import of_their_kinds
 from ..texts import shortened
 from .law_info import LawInfo, ParameterInfo, Role
 from .laws import core_law, laws, springs
@@ -49,6 +50,7 @@ class Contact:
     parameters: Values
     name: str
 
+    @of_their_kinds
     def __init__(
         self,
         law: str | PythonLaw,

@@ -17,6 +17,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from ..given import LARGEST, array_of, masked, with_a_square
+from ..kinds import of_their_kinds
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
@@ -73,6 +74,7 @@ class Model(Destroyable):
         Of matrices that a reduction has made (`Reduction.omitted`): what it has left out, for estimates of errors.
     """
 
+    @of_their_kinds
     def __init__(
         self,
         M: Term,

@@ -14,7 +14,8 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError, NothingMoves, PetscError
 from ..files.memory import machine_memory, size
-from ..given import whole
+from ..given import positive, whole
+from ..kinds import of_their_kinds
 from ..mpi.gather import on_all_ranks
 from ..mpi.guard import all_ranks_failed
 from .checks import DENSE_LIMIT, check_mass
@@ -59,6 +60,7 @@ class LinearMode:
         return self.omega / (2 * np.pi)
 
 
+@of_their_kinds
 def linear_modes(
     model: Model, count: int = 6, contact: str = "stuck", near: float | None = None, stable: bool = False
 ) -> list[LinearMode]:
@@ -95,8 +97,9 @@ def linear_modes(
     """
     if contact not in ("stuck", "free", "linearised"):
         raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
-    if near is not None and (contact == "linearised" or not 0 < near < np.inf):
-        given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
+    near = None if near is None else positive("near", near)
+    if near is not None and (contact == "linearised"):
+        given, fix = f"near={near}, contact={contact}", "give stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
     count = _number(count)
     model.check_unchanged()

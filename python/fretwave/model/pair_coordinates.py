@@ -19,6 +19,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
+from ..kinds import of_their_kinds
 from .sectors import real_csr
 from .structure import Structure
 
@@ -26,6 +27,7 @@ from .structure import Structure
 REGULAR = 1e-3
 
 
+@of_their_kinds
 def on_pair_coordinates(structure: Structure) -> Structure:
     """The same structure in coordinates of which each row of its pairs is one; `expansion` leads back to the dofs.
 

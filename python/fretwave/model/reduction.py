@@ -15,6 +15,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from ..given import whole
+from ..kinds import of_their_kinds
 from ..mpi.destroyable import Destroyable, Destroyed
 from ..mpi.gather import on_all_ranks
 from .frequency_error import FrequencyError, frequency_error
@@ -191,6 +192,7 @@ class Reduction(Destroyable):
         return np.ascontiguousarray(rows.reshape(expected, -1))
 
 
+@of_their_kinds
 def reduce(
     M: Given,
     K: Given,

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..errors import InputError
-from ..given import masked, whole
+from ..given import masked, numbers, whole
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -177,7 +177,8 @@ def rotation(angle: float, axis: str = "z") -> Array:
     """Rotation (3, 3) by `angle` [rad] about a Cartesian axis, positive by the right-hand rule."""
     if axis not in ("x", "y", "z"):
         raise InputError("unknown axis of rotation", None, axis, "x, y or z", 'use axis="z"')
-    i, c, s = "xyz".index(axis), np.cos(angle), np.sin(angle)
+    turned = float(numbers("angle", angle))
+    i, c, s = "xyz".index(axis), np.cos(turned), np.sin(turned)
     turn = np.zeros((3, 3))
     turn[i, i] = 1.0
     j, k = (i + 1) % 3, (i + 2) % 3

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Indices
 from ..errors import InputError
 from .largest import largest
 
@@ -32,7 +32,7 @@ def most_damped(zeta: Array) -> int:
     return largest(zeta, least=LEAST_DAMPING)
 
 
-def varies(table: Mapping[str, Any], rows: Any = slice(None)) -> bool:
+def varies(table: Mapping[str, Any], rows: Indices | slice = slice(None)) -> bool:
     """Damping changes along some rows of a branch by more than rounding, and than its solver left of it."""
     zeta, left = np.asarray(table["zeta"])[rows], np.zeros(1)
     if "lambda_error_solver" in table and "omega0" in table:

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..files.dimensions import put_array
 from ..files.streams import behind
 from ..files.whole import Unfailing, beside, check_whole, seal, sealed_size, take_place, told
+from ..kinds import of_their_kinds
 from ..texts import display
 from ..units import units_of
 from .journal import unfinished
@@ -157,6 +158,7 @@ class Results(Mapping[str, Any]):
                 file.close()
 
 
+@of_their_kinds
 def has_results(folder: str | Path) -> bool:
     """Whether there is anything for `open_results`."""
     folder = Path(folder)
@@ -169,6 +171,7 @@ def unit_of_amplitudes(group: h5py.Group) -> str:
     return str(group["points/amplitude"].attrs.get("units", of_lengths)) if "points/amplitude" in group else of_lengths
 
 
+@of_their_kinds
 def open_results(path: str | Path) -> Results:
     """The results of a run folder, those of unfinished analyses included, to be read.
 

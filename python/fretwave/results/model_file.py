@@ -48,6 +48,7 @@ from ..arrays import IntArray
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..files.whole import Unfailing, check_whole, replaced, seal
+from ..kinds import of_their_kinds
 from ..model.cells import KINDS
 from ..model.pairs import Pairs
 from ..model.sectors import by_sector, real_csr
@@ -73,6 +74,7 @@ def dof_name(node: int, direction: int) -> str:
     return f"n{node}" + (DIRECTIONS[direction - 1] if known else f"d{direction}")
 
 
+@of_their_kinds
 def write_model(
     path: str | Path, structure: Structure, units: str | None = None, sources: Sequence[SourceFile] = ()
 ) -> None:
@@ -199,6 +201,7 @@ def _write_sparse(group: h5py.Group, matrix: sp.spmatrix) -> None:
         group[key] = getattr(rows, key)
 
 
+@of_their_kinds
 def read_model(path: str | Path) -> Structure:
     """Read a model file. One rank only (see `fretwave.mpi.guard.on_first_rank`).
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..columns import name_of
 from ..errors import InputError
+from ..kinds import of_their_kinds
 from .analysis import Analysis, Table, read_analysis
 from .file import has_results, open_results
 from .stamp import of_one_model
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     import h5py
 
 
+@of_their_kinds
 def open_run(folder: str | Path) -> Run:
     """Read a run that is done, still going on, or was killed; neither MPI nor PETSc is needed.
 
@@ -48,6 +50,7 @@ def write_curve(group: h5py.Group, folder: Path) -> None:
 class Run:
     """The analyses and tables of a run folder."""
 
+    @of_their_kinds
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
         self.analyses: dict[str, Analysis] = {}

@@ -13,6 +13,7 @@ from .. import _core
 from ..errors import InputError
 from ..given import with_a_square
 from ..hb.harmonic_problem import HarmonicProblem
+from ..kinds import of_their_kinds
 from ..mpi.log import event
 from ..mpi.spread import Cuttable, Spread, fill
 from .starting import far_from_start, given, starts
@@ -84,6 +85,7 @@ class Continuation:
         is not looked for on ways of its own, as it is otherwise (`started` tells)
     """
 
+    @of_their_kinds
     def __init__(
         self,
         problem: HarmonicProblem,

@@ -14,6 +14,7 @@ from ..given import array_of, numbers, real
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.observed import Observed, unit_of
 from ..hb.observer import Observer
+from ..kinds import of_their_kinds
 from .branch import Branch
 from .continuation import Continuation, Point
 from .refining import RefiningContinuation
@@ -26,6 +27,7 @@ from .unknowns import Unknowns
 AT_AN_END = 1e-9
 
 
+@of_their_kinds
 def follow(
     problem: HarmonicProblem,
     start: float | PETSc.Vec,

@@ -14,6 +14,7 @@ from ..errors import InputError, NotConverged
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.harmonics import Harmonics
 from ..hb.suspects import suspects
+from ..kinds import of_their_kinds
 from ..model.laws import own_load
 from ..model.model import Model
 from ..model.modes import LinearMode, linear_modes
@@ -93,6 +94,7 @@ class StaticPreload(HarmonicProblem):
         return y
 
 
+@of_their_kinds
 def balanced(model: Model, reference: LinearMode | None = None) -> Rest:
     """Normal loads given pair by pair are in balance as they are: no displacement, the load is B^T f(0). Collective.
 
@@ -107,6 +109,7 @@ def balanced(model: Model, reference: LinearMode | None = None) -> Rest:
     return _settled(problem, y, np.zeros(model.n_dof))
 
 
+@of_their_kinds
 def static_preload(
     model: Model,
     load: Array,

@@ -101,5 +101,5 @@ class WearControl:
         if (whole(self.max_points) or 0) < 2:
             expected = "a whole number >= 2"
             raise InputError("a march needs two points", "wear.max_points", self.max_points, expected, "allow more")
-        if self.stepper not in STEPPERS:
+        if self.stepper not in list(STEPPERS):
             raise InputError("unknown stepper", None, self.stepper, ", ".join(STEPPERS), "choose one of these")

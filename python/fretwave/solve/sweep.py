@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import FretwaveError, InputError
+from ..kinds import of_their_kinds
 from ..mpi import groups
 from .branch import Branch
 
@@ -68,6 +69,7 @@ class Sweep:
         return f"Sweep({len(self)} branches over {over}{f', {lost} failed' if lost else ''})"
 
 
+@of_their_kinds
 def sweep(work: Callable[..., Branch], *, comm: MPI.Intracomm | None = None, **over: Sequence[Any]) -> Sweep:
     """Follow a branch for every value of a parameter, or for all combinations of several. Collective.
 

@@ -12,6 +12,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from ..given import numbers, positive, positive_or_infinite
+from ..kinds import of_their_kinds
 from ..model.model import Model
 from ..mpi.gather import on_all_ranks
 from .steps import TIME_TOLERANCE
@@ -39,6 +40,7 @@ class Transient:
         A contact law has a memory, the model is one sector, or a force has no frequency.
     """
 
+    @of_their_kinds
     def __init__(
         self,
         model: Model,

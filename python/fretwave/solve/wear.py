@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from ..arrays import Array
 from ..given import numbers, positive
+from ..kinds import of_their_kinds
 from .steppers import STEPPERS, StageDiverged, StageFailed, take
 from .steps import TOO_FAST, TOO_MANY, WearControl
 from .worn_mode import WornMode, WornState
@@ -67,6 +68,7 @@ class Wear:
     outcome : Newton and linear iterations and residual that y was found with
     """
 
+    @of_their_kinds
     def __init__(
         self,
         mode: WornMode,

@@ -11,6 +11,7 @@ from ..arrays import Array
 from ..columns import MODAL, Column, columns_named
 from ..errors import InputError
 from ..given import positive
+from ..kinds import of_their_kinds
 from .branch import Branch
 from .steps import WearControl
 from .table import Table
@@ -76,6 +77,7 @@ class WearMarch(Table):
         return "\n".join([*lines, *(f"missed: {text}" for text in self.missed)])
 
 
+@of_their_kinds
 def wear(
     branch: Branch,
     amplitude: float,

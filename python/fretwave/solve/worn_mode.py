@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..errors import InputError
 from ..given import not_negative, numbers
 from ..hb.harmonic_problem import HarmonicProblem
+from ..kinds import of_their_kinds
 from ..model.law_info import Role
 from ..model.laws import law_like
 from ..mpi.destroyable import Destroyable
@@ -71,6 +72,7 @@ class WornMode(Destroyable):
         There is no such contact, or it cannot wear; the coefficient is below zero, or an area no number above.
     """
 
+    @of_their_kinds
     def __init__(self, problem: HarmonicProblem, coefficient: float, areas: Mapping[str, Array]) -> None:
         self.problem, self.model, self.coefficient = problem, problem.model, not_negative("coefficient", coefficient)
         names = [contact.name for contact in self.model.contacts]
