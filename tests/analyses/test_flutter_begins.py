@@ -11,8 +11,9 @@ from command_line import call
 from tolerances import SOLVED
 
 import fretwave as fw
+from fretwave.analyses import flutter
 from fretwave.run.order import RunOptions
-from fretwave.run.runner import run_case
+from fretwave.run.runner import resume_run, run_case
 
 SECTORS, OMEGA = 5, 1.0
 #: Masses of 1 kg, each on a spring of 1 N/m to the next one and none to the ground, with a slider beside it.
@@ -74,6 +75,29 @@ def test_a_rigid_wave_leaves_the_others_their_branches(shared_tmp, comm):
     with open(out / "flutter_waves.csv", newline="") as file:
         found = {int(row["nodal_diameter"]): float(row["zeta"]) for row in csv.DictReader(file)}
     assert found == {d: pytest.approx(first_zeta(d), rel=SOLVED) for d in (-2, -1, 1, 2)}
+
+
+@pytest.mark.ranks(1)
+def test_a_resumed_run_tells_the_same_of_a_wave_before_it(tmp_path, comm, monkeypatch):
+    """Killed behind the wave that cannot begin, it told the advice of a branch that breaks off."""
+    out, options, row_of = tmp_path / "run", RunOptions(out=tmp_path / "run", plots=False), flutter.record
+    with pytest.raises(fw.NotConverged) as whole:
+        run_case(written(tmp_path, comm), RunOptions(out=tmp_path / "whole", plots=False), comm)
+
+    def interrupted(*arguments):
+        row = row_of(*arguments)
+        if row["nodal_diameter"] == 1:
+            raise KeyboardInterrupt
+        return row
+
+    monkeypatch.setattr(flutter, "record", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_case(written(tmp_path, comm), options, comm)
+    monkeypatch.undo()
+    with pytest.raises(fw.NotConverged) as resumed:
+        resume_run(out, comm, plots=False)
+    assert OTHERS in str(whole.value) and resumed.value.fix == whole.value.fix
+    assert str(resumed.value).replace(str(out), "") == str(whole.value).replace(str(tmp_path / "whole"), "")
 
 
 @pytest.mark.ranks(1)

@@ -37,7 +37,7 @@ from .parts.flutter_wave import in_wave_of, raise_if_all, what_to_do, why_not
 from .parts.observed import named
 from .parts.others import with_others
 from .parts.rest import keep_pairs, rest_state, retained, start_mode, stuck_or_free
-from .parts.several import ending_of, stopped_before, with_stopped
+from .parts.several import ending_of, refused_before, stopped_before, with_refused, with_stopped
 
 if TYPE_CHECKING:
     from ..case.facts import Facts
@@ -154,11 +154,11 @@ def _all_waves(
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("wave_number", 0))
     stopped = stopped_before(own)
-    cannot: dict[int, InputError] = {}
+    cannot = refused_before(own)
     with context.console.progress(context.name):
         for number in range(first, len(diameters)):
             wave = _Wave(context, diameters, number, harmonics)
-            why = wave.follow(writer, snapshot, found and number == first, stopped)
+            why = wave.follow(writer, snapshot, found and number == first, stopped, cannot)
             stopped.update({number: why} if why else {})
             cannot.update({wave.diameter: wave.cannot} if wave.cannot else {})
     raise_if_all(cannot, diameters)
@@ -213,9 +213,14 @@ class _Wave:
         self.cannot: Optional[InputError] = None  #: why it cannot begin
 
     def follow(
-        self, writer: AnalysisWriter, snapshot: Optional[dict[str, Any]], go_on: bool, earlier: Mapping[int, str]
+        self,
+        writer: AnalysisWriter,
+        snapshot: Optional[dict[str, Any]],
+        go_on: bool,
+        earlier: Mapping[int, str],
+        refused: Mapping[int, InputError],
     ) -> str:
-        """Write its points, with what earlier waves stopped for; returns why it did, or nothing. Collective."""
+        """Write its points, with why earlier waves stopped or could not begin; returns why it did. Collective."""
         analysis = self.analysis
         with in_wave_of(self.context, self.diameter) as own_context:
             try:
@@ -227,7 +232,8 @@ class _Wave:
             low, high = analysis.amplitude
             branch = continuation(own_context, problem, (low, high), analysis.report_at, snapshot, go_on, name)
             for point in points_of(branch):
-                own, now = with_stopped(earlier, wave_number=self.number), branch.problem
+                own = {**with_stopped(earlier, wave_number=self.number), **with_refused(refused)}
+                now = branch.problem
                 self._say(record(writer, now, point, branch.snapshot(), own, self._column, self.analysis.errors))
             tell(self.context, branch, name)
             stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"

@@ -7,22 +7,43 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from ...errors import InputError
 from ...results.file import ENDED
 
-#: In the state that an analysis goes on from: why branches before it stopped.
-STOPPED = "stopped"
+#: In the state that an analysis goes on from: why branches before it stopped, and with what errors some never began.
+STOPPED, REFUSED = "stopped", "refused"
 
 
 def stopped_before(own: Mapping[str, Any]) -> dict[int, str]:
     """Why branches before the one that is gone on with stopped early, by their numbers."""
-    kept = own.get(STOPPED)
-    return {} if kept is None else {int(k): why for k, why in json.loads(bytes(np.asarray(kept))).items()}
+    return {int(number): why for number, why in _kept(own, STOPPED).items()}
+
+
+def refused_before(own: Mapping[str, Any]) -> dict[int, InputError]:
+    """Errors of branches before that one that could not begin, by what tells them apart."""
+    return {int(branch): InputError(*said) for branch, said in _kept(own, REFUSED).items()}
 
 
 def with_stopped(stopped: Mapping[int, str], **own: float) -> dict[str, Any]:
     """An analysis' own part of the state to go on from, with why earlier branches stopped."""
-    return {**own, STOPPED: np.frombuffer(json.dumps(dict(stopped)).encode(), dtype=np.uint8)}
+    return {**own, STOPPED: _bytes(stopped)}
+
+
+def with_refused(refused: Mapping[int, InputError]) -> dict[str, Any]:
+    """A further part of it: what `refused_before` gives, none where all began."""
+    said = {number: [None if one is None else str(one) for one in error.args] for number, error in refused.items()}
+    return {REFUSED: _bytes(said)} if said else {}
+
+
+def _bytes(told: Mapping[int, Any]) -> npt.NDArray[np.uint8]:
+    return np.frombuffer(json.dumps(dict(told)).encode(), dtype=np.uint8)
+
+
+def _kept(own: Mapping[str, Any], name: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(bytes(np.asarray(own[name]))) if name in own else {}
+    return found
 
 
 def ending_of(
