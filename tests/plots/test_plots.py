@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from command_line import call
+from matplotlib.figure import Figure
 from models.legends import legend_texts
 from models.table_rows import SHARED
 from tolerances import ROUNDING
@@ -163,6 +164,24 @@ def test_pictures_are_vectors_on_request(folder):
     content = [path.read_bytes() for path in first]
     assert b"<svg" in content[0][:500] and content[1].startswith(b"%PDF-")
     assert [path.read_bytes() for path in plot_run(folder, ["forced"], formats=["svg", "pdf"])] == content
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_pictures_that_the_results_do_not_make_any_more_are_told_and_stay(tmp_path, capsys, ending):
+    """Those of an analysis that is gone looked like pictures of these results; a user's own are nobody's business."""
+    write_mode(tmp_path, "former")
+    (former,) = plot_run(tmp_path, ["backbone"], formats=[ending])
+    own = former.with_name(f"own.{ending}")
+    Figure().savefig(own)
+    (tmp_path / "results.h5").unlink()
+    write_mode(tmp_path)
+    for _ in range(2):
+        assert call("plot", tmp_path, "--format", ending) == 0
+        said = capsys.readouterr().out
+        assert f"note: 1 picture from before that these results do not make: former_backbone.{ending}\n" in said
+        assert former.exists() and own.exists() and "own" not in said
+    former.unlink()
+    assert call("plot", tmp_path, "--format", ending) == 0 and "from before" not in capsys.readouterr().out
 
 
 def test_an_empty_folder_has_no_pictures(tmp_path):

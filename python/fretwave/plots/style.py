@@ -38,6 +38,9 @@ PEAK: dict[str, Any] = {
 
 #: Formats of pictures, and what they are not to say: when they were drawn.
 FORMATS: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+#: Where they say what has drawn them, and as what that stands in the file.
+MAKER = {"png": ("Software", "Software\0{}"), "svg": ("Creator", "<dc:title>{}<"), "pdf": ("Creator", "/Creator ({})")}
+PLOT, VIEW = "fretwave plot", "fretwave view"
 WIDTH = 8.0  # [inch]; with DPI 130 about 1040 pixels, a README shows 800 to 900
 DPI = 130
 
@@ -79,11 +82,19 @@ def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -
     return figure, figure.subplots(rows, columns, **options)
 
 
-def save(figure: Figure, path: Path) -> Path:
+def save(figure: Figure, path: Path, maker: str = PLOT) -> Path:
     """Write it in the format of the file's ending, one of `FORMATS`; the same figure gives the same file."""
+    ending = path.suffix[1:]
     with replaced(path, own=True, keep_suffix=True) as fresh:
-        figure.savefig(fresh, dpi=DPI, metadata=FORMATS[path.suffix[1:]])
+        figure.savefig(fresh, dpi=DPI, metadata={**FORMATS[ending], MAKER[ending][0]: maker})
     return path
+
+
+def is_from(path: Path, maker: str = PLOT) -> bool:
+    """A picture that it has written, of whatever results."""
+    if path.suffix[1:] not in MAKER or not path.is_file():
+        return False
+    return MAKER[path.suffix[1:]][1].format(maker).encode() in path.read_bytes()
 
 
 def label(text: str, unit: str = "") -> str:

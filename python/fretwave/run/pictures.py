@@ -11,6 +11,9 @@ from ..errors import InputError
 from ..results.runfolder import RECORD, read_record
 from ..texts import counted, display
 
+#: Pictures from before.
+MOST_NAMED = 8
+
 
 def plot(folder: Path, console: Console, only: Sequence[str] | None = None, formats: Sequence[str] = ("png",)) -> int:
     """Make the pictures of a run folder; returns how many.
@@ -29,8 +32,21 @@ def plot(folder: Path, console: Console, only: Sequence[str] | None = None, form
     for line in failed:
         console.line(line)
     console.line(f"{counted(len(files), 'picture')} in {display(folder)}")
+    if only is None and not failed:
+        _tell_others(folder, files, console)
     _expect(only or (), sorted(drawable - {""}), folder)
     return len(files)
+
+
+def _tell_others(folder: Path, files: Sequence[Path], console: Console) -> None:
+    """Pictures of analyses that are not here any more, or of settings that had others; nobody's file is removed."""
+    from ..plots.style import is_from
+
+    names = {path.stem for path in files}
+    others = sorted(path.name for path in folder.glob("*.*") if path.stem not in names and is_from(path))
+    if others:
+        shown = ", ".join(others[:MOST_NAMED]) + (", ..." if others[MOST_NAMED:] else "")
+        console.line(f"note: {counted(len(others), 'picture')} from before that these results do not make: {shown}")
 
 
 def _expect(only: Sequence[str], drawable: Sequence[str], folder: Path) -> None:

@@ -76,7 +76,7 @@ class Still:
         with style.rules():
             figure, show = self._figure()
             show(int(np.argmax(self.sizes.max(axis=1))))
-            style.save(figure, path)
+            style.save(figure, path, style.VIEW)
 
     def gif(self, path: Path) -> None:
         """All phases one after the other, again and again."""
