@@ -13,7 +13,10 @@ from models.swept_case import CASE, MEMORYLESS
 from models.wear_case import write_case
 from tolerances import REPEATED, SOLVED
 
+from fretwave.columns import Column
+from fretwave.post.grid import Plan
 from fretwave.results.file import rewritten
+from fretwave.results.sweep_quantiles import quantile_lines
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -217,6 +220,23 @@ def test_limit_cycles_by_start(tmp_path: Path, capsys) -> None:
     unstable = 4 * np.array([0.05, 0.05, 0.052, 0.052]) / (np.pi * 0.01)
     assert np.array_equal(last > unstable, [False, True, False, True])
     assert "ends: friction_limit = 0.052, start 1: no limit cycle" in capsys.readouterr().out
+
+
+def test_of_many_modes_the_lowest_are_told_and_where_the_others_stand(tmp_path: Path, capsys) -> None:
+    """A wheel has hundreds: each had a line. Of 24 modes six, of waves of which each has two modes the first."""
+    text = ring(24).replace("speed_rpm = 6.0\n", "wheel = true\nmistuning = { standard_deviation = 0.03 }\n")
+    run = swept(tmp_path, text, "linear.mistuning.seed=1:3", "linear")
+    said = [line for line in capsys.readouterr().out.splitlines() if "] Hz (n = 3)" in line]
+    assert [line.split(": ")[1] for line in said] == [f"hz_{c}_{k}" for c in ("stuck", "free") for k in range(1, 7)]
+    assert len({row["quantity"] for row in rows(run / "linear_quantiles.csv")}) == 48
+    plan, waves = Plan({"a.seed": [1, 2, 3]}), range(25)
+    names = [f"hz_{contact}_{k}" for contact in ("stuck", "free") for k in (1, 2)]
+    table = [
+        {"value": k, "nodal_diameter": d, "done": 1, **dict.fromkeys(names, k + d)} for k in range(3) for d in waves
+    ]
+    lines = quantile_lines("linear", plan, table, [Column(name, "Hz", name) for name in names], "nodal_diameter")
+    assert sum("n = 3" in line for line in lines) == 50
+    assert "linear: hz_stuck_2, hz_free_2: see linear_quantiles.csv" in lines
 
 
 def test_no_quantile_of_what_is_cut_off(tmp_path: Path) -> None:

@@ -14,6 +14,8 @@ from ..post.mode_curve import without_rounding
 from ..post.quantiles import CONFIDENCE, least_count, quantiles
 
 Row = Mapping[str, Any]
+#: Of what is numbered, as linear modes are, this many are told on the terminal; where that fills it, the first.
+MOST_TOLD, FULL = 6, 40
 #: Of a summary, before the number of the amplitude in the order of the branch.
 AMPLITUDE_AT = "amplitude_at_"
 
@@ -95,12 +97,17 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
     by_lead, heads = _by_lead(plan, rows, keys), dict[str, list[dict[str, Any]]]()
     for row in table:
         heads.setdefault(_text(row, (*keys, "quantity")), []).append(row)
-    for mine in heads.values():
+    told, beyond = _of_few(list(heads.values()), MOST_TOLD)
+    if len(told) > FULL:
+        told, beyond = _of_few(list(heads.values()), 1)
+    for mine in told:
         row = mine[0]
         place = "".join(f", {key.rpartition('.')[2].replace('_', ' ')} = {row[key]}" for key in keys)
         at = reported_at(row["quantity"], by_lead.get(_text(row, keys), []))
         place += f", at amplitude {at}" if at else ""
         lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
+    if beyond:
+        lines.append(f"{name}: {', '.join(beyond)}: see {name}_quantiles.csv")
     if lines:
         lines.append(f"{name}: in brackets the {100 * CONFIDENCE:g} % confidence intervals of the quantiles")
     none = _had_by_none(plan, rows, columns)
@@ -115,6 +122,19 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         for q, n in short.items()
     ]
     return lines
+
+
+def _of_few(groups: Sequence[list[dict[str, Any]]], most: int) -> tuple[list[list[dict[str, Any]]], list[str]]:
+    """Those that are told of many of one kind, by number, and which others there are: a wheel has hundreds of modes."""
+    told, beyond = list[list[dict[str, Any]]](), dict[str, set[int]]()
+    for mine in groups:
+        stem, _, number = str(mine[0]["quantity"]).rpartition("_")
+        if number.isdigit() and int(number) > most and not stem.endswith("_at"):
+            beyond.setdefault(stem, set()).add(int(number))
+        else:
+            told.append(mine)
+    ends = {stem: sorted({min(numbers), max(numbers)}) for stem, numbers in beyond.items()}
+    return told, [f"{stem}_{' to '.join(map(str, both))}" for stem, both in ends.items()]
 
 
 def _had_by_none(plan: Plan, rows: Sequence[Row], columns: Sequence[Column]) -> list[str]:
