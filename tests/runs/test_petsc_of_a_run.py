@@ -109,6 +109,29 @@ def test_one_of_another_analysis_leaves_a_sweep_alone(tmp_path: Path, capfd) -> 
     assert UNREAD not in "".join(capfd.readouterr())
 
 
+@pytest.mark.parametrize(
+    ("petsc", "only", "told"),
+    [
+        ("-static_snes_max_it 24", "mode,losses", True),
+        ("-modes_eps_ncv 30", "mode,losses", False),
+        ("-free_decay_ts_max_steps 9", "mode,losses", True),
+    ],
+    ids=["no static state", "read by every value", "of an analysis that does not run"],
+)
+def test_what_no_value_of_a_sweep_reads_is_told(tmp_path: Path, capfd, petsc: str, only: str, told: bool) -> None:
+    """A single run said so at its end, a sweep nothing."""
+    text = as_toml(bases.two_dof())
+    sweep = '[[analysis]]\nname = "losses"\ntype = "sweep"\nof = "mode_epmc"\nover = { mode_epmc.harmonics = [1, 3] }\n'
+    (tmp_path / "case.toml").write_text(text + sweep, encoding="utf-8")
+    given = ["--no-plots", f"--petsc={petsc}"]
+    assert call("run", tmp_path / "case.toml", "--only", only, *given, "--out", tmp_path / "one") == 0
+    said, (name, _) = "".join(capfd.readouterr()), petsc.split()
+    assert said.count(f"{UNREAD}: {name}") == told
+    words = ["--over", "mode.harmonics=1,3", "--only", "mode", "--out", tmp_path / "two"]
+    assert call("sweep", tmp_path / "case.toml", *words, "--petsc=-static_snes_max_it 24 -modes_eps_ncv 30") == 0
+    assert f"note: PETSc options {UNREAD}: -static_snes_max_it\n" in capfd.readouterr().out
+
+
 def test_shared_ones_of_an_analysis_alone_are_told(run) -> None:
     code, said = run("mode", "", "--set", 'mode.petsc="-static_snes_rtoll 1e-9"')
     assert code == 0 and f"{UNREAD}: -static_snes_rtoll" in said

@@ -26,6 +26,8 @@ READ_BY = {
     HARMONIC_KIND: re.compile(r"(route|blocks)$|(snes|ksp|pc|mat|tangent|whole|npc)_"),
     TIME_KIND: re.compile(r"(ts|mass)_"),
 }
+#: Of the record of a sweep's value: names that nothing has read, and lines on single analyses.
+UNREAD = "petsc_unread"
 #: What PETSc reads as it starts, before a case is known.
 AT_START = re.compile(
     r"(malloc|info|fp_trap|options_(left|view|monitor|file|string_file)|on_error|start_in_debugger|debugger|stop_for|no_signal"

@@ -22,7 +22,7 @@ from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.log import event
 from ..mpi.petsc_options import AnalysisOptions, said_unread, unread_outside
-from ..mpi.petsc_share import REDUCTION, TIME, RunWide, kind_of, prefix_of
+from ..mpi.petsc_share import REDUCTION, TIME, UNREAD, RunWide, kind_of, prefix_of
 from ..mpi.petsc_values import parse
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
@@ -98,6 +98,9 @@ class Runner:
         self.failures: list[NotConverged] = []
         #: PETSc options that something has read.
         self.read: set[str] = set()
+        #: What nothing has read in any value of a sweep, sweep by sweep, and lines about that of single analyses.
+        self._unread_in_sweeps: list[Sequence[str]] = []
+        self._unread_lines: list[str] = []
         self._basis: Callable[[], None] = _nothing
         if resuming:
             on_first_rank(comm, self._check_readable)
@@ -144,7 +147,7 @@ class Runner:
             if self.case.basis is not None:
                 self.case.basis.destroy()
         self._say_left_out(names)
-        self._say_unread(bool(sweeps))
+        self._say_unread()
         self._finish()
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
@@ -314,7 +317,8 @@ class Runner:
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
         if unread and outcome.points:
-            self.console.line(f"{analysis.name}: {unread}")
+            self._unread_lines.append(f"{analysis.name}: {unread}")
+            self.console.line(self._unread_lines[-1])
         if outcome.points and not self.part:
             with event("FwCurve"):
                 context.write_curves()
@@ -328,6 +332,11 @@ class Runner:
         self._start()
         outcome = run_sweep(sweep, name, self.comm, self.console, self.folder, self.case.title)
         self._note(name, outcome, time.perf_counter() - began)
+        names, lines = on_first_rank(self.comm, lambda: sweep.unread(self.folder.record["run_id"]))
+        self._unread_in_sweeps.append(names)
+        own = [one for one in names if one not in dict(self.wide.pairs)]
+        for line in [*lines, *filter(None, [said_unread(own)])]:
+            self.console.line(f"{name}: {line}")
 
     def _note(self, name: str, outcome: Outcome, seconds: float, entry: Mapping[str, Any] | None = None) -> None:
         """Print the outcome and keep it in run.json, with what else `entry` says."""
@@ -356,12 +365,15 @@ class Runner:
         for line in told:
             self.console.line(line)
 
-    def _say_unread(self, sweeps: bool) -> None:
+    def _say_unread(self) -> None:
         """Options without effect: those of the whole run that no analysis has read, those of the environment."""
         from .. import _core
 
         idle = [name for name in self.wide.of_all() if name not in self.read]
-        if idle and not self.resuming and not self.part and not sweeps:  # a sweep's values read them in their own runs
+        idle = [name for name in idle if all(name in names for names in self._unread_in_sweeps)]
+        if self.part and not self.resuming:
+            self.folder.record[UNREAD] = {"names": idle, "lines": self._unread_lines}
+        if idle and not self.resuming and not self.part:
             self.console.line(f"note: {said_unread(idle)}")
         unread = unread_outside(_core.unused_options(), self.wide)
         if unread:

@@ -23,6 +23,7 @@ from ..console import Estimate, Shown
 from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
+from ..mpi.petsc_share import UNREAD
 from ..post.grid import Plan
 from ..results.runfolder import RECORD, new_record, read_record
 from ..results.sweeps import Branch, read_branch
@@ -141,6 +142,15 @@ class Sweep:
             place = f"{self.folder.name}/{number:04d}"
             found.append({"over": values, "folder": place, "status": status, "reason": reason, **times})
         return found
+
+    def unread(self, run_id: str) -> tuple[list[str], list[str]]:
+        """PETSc options that no value's solvers have read, and what is said of single analyses. One rank only."""
+        records = [self._record(number, run_id) for number in range(len(self.plan))]
+        told = [record[UNREAD] for record in records if record is not None and UNREAD in record]
+        if not told or any(record is not None and UNREAD not in record for record in records):
+            return [], []  # of a value that was gone on with it is not known
+        names, lines = ([one for one in told[0][key] if all(one in own[key] for own in told)] for key in told[0])
+        return names, lines
 
     def forget_others(self) -> None:
         """Remove runs of values of an earlier sweep that had more of them. One rank only."""
