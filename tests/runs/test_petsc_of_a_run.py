@@ -52,6 +52,22 @@ def test_it_need_be_read_by_one_analysis_alone(run, petsc: str) -> None:
     assert code == 0 and UNREAD not in said
 
 
+@pytest.mark.parametrize("routes", ["-mode_epmc_route krylov", "-mode_route krylov -mode_epmc_route direct"])
+def test_it_need_be_read_by_one_route_alone(run, routes: str) -> None:
+    """The first analysis refused what the other one's route reads."""
+    code, said = run("mode,mode_epmc", f"{routes} -ksp_gmres_restart 40")
+    assert code == 0 and UNREAD not in said
+    code, said = run("mode,mode_epmc", f"{routes} -ksp_gmres_restrat 40")
+    assert code == 2 and "no solver reads the PETSc option -ksp_gmres_restrat" in said
+
+
+def test_the_route_may_stand_in_the_case(run) -> None:
+    more = ("--set", "mode_epmc.petsc='-route krylov'")
+    assert run("mode,mode_epmc", "-ksp_gmres_restart 40", *more)[0] == 0
+    code, said = run("mode,mode_epmc", "-ksp_gmres_restart 40")
+    assert code == 2 and "analysis 'mode'" in said
+
+
 def test_of_one_analysis_it_steers_that_alone(run) -> None:
     said = run("mode,mode_epmc", "-mode_epmc_snes_monitor")[1]
     first, second = said.split("mode_epmc: 2 of 2 analyses")

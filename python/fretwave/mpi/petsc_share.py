@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -37,6 +37,12 @@ AT_START = re.compile(
 )
 
 
+def choosing(pairs: Sequence[tuple[str, str | None]], prefix: str) -> dict[str, str | None]:
+    """Those of an analysis' own options that choose its solvers, without its prefix."""
+    plain = {name.removeprefix(prefix): value for name, value in pairs}
+    return {name: value for name, value in plain.items() if name in ("route", "blocks") or name.endswith("_type")}
+
+
 def prefix_of(name: str) -> str:
     """Prefix of the options of the analysis of this name."""
     return name.replace("-", "_") + "_"
@@ -66,11 +72,17 @@ class RunWide:
         Kind of each analysis that runs by its prefix, in their order.
     others : sequence of str
         Prefixes of the case's analyses that do not run: what is theirs is nobody else's.
+    own : dict
+        Options of each analysis alone by its prefix, as far as they choose its solvers (`choosing`).
+    read : set of str
+        Options that analyses before have read.
     """
 
     pairs: Sequence[tuple[str, str | None]] = ()
     kinds: Mapping[str, str] = field(default_factory=dict)
     others: Sequence[str] = ()
+    own: Mapping[str, Mapping[str, str | None]] = field(default_factory=dict)
+    read: Container[str] = ()
 
     @property
     def known(self) -> tuple[str, ...]:
@@ -107,6 +119,15 @@ class RunWide:
             return False
         if plain.startswith(TIME):
             return True
-        first = next((other for other, its in self.kinds.items() if its == kind), prefix)
         others = {its for other, its in self.kinds.items() if other != prefix and its != kind}
-        return first != prefix or any(its in others and rule.match(plain) for its, rule in READ_BY.items())
+        return self._of_like_ones(prefix, plain) or any(its in others and r.match(plain) for its, r in READ_BY.items())
+
+    def _of_like_ones(self, prefix: str, plain: str) -> bool:
+        """Analyses of its kind before it have seen to it, or one after it that has other solvers will."""
+        like = [other for other, its in self.kinds.items() if its == self.kinds.get(prefix)]
+        place = like.index(prefix) if prefix in like else 0
+        before, after = (
+            [self.own.get(other) == self.own.get(prefix) for other in part]
+            for part in (like[:place], like[place + 1 :])
+        )
+        return any(before) or not all(after) or (place > 0 and plain in self.read)

@@ -22,7 +22,7 @@ from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.log import event
 from ..mpi.petsc_options import AnalysisOptions, said_unread, unread_outside
-from ..mpi.petsc_share import REDUCTION, TIME, UNREAD, RunWide, kind_of, prefix_of
+from ..mpi.petsc_share import REDUCTION, TIME, UNREAD, RunWide, choosing, kind_of, prefix_of
 from ..mpi.petsc_values import parse
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
@@ -138,6 +138,8 @@ class Runner:
             parse(self.options.petsc),
             {prefix_of(name): kind_of(self.case.analyses[name]) for name in names},
             [prefix_of(name) for name in self.case.analyses if name not in names],
+            {prefix_of(name): self._choosing(self.case.analyses[name]) for name in names},
+            self.read,
         )
         self._greet(names)
         self._reduce([name for name in names if name not in sweeps])
@@ -152,6 +154,12 @@ class Runner:
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
         return EXIT_DONE
+
+    def _choosing(self, analysis: AnalysisSection) -> dict[str, str | None]:
+        """Options of an analysis alone that choose its solvers."""
+        prefix = prefix_of(analysis.name)
+        wide = [pair for pair in parse(self.options.petsc) if pair[0].startswith(prefix)]
+        return choosing([*wide, *parse(analysis.petsc)], prefix)
 
     def _run_all(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
         for number, name in enumerate(names, 1):
