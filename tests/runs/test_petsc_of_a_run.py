@@ -17,6 +17,7 @@ from mutations import as_toml  # noqa: E402
 from fretwave.errors import InputError  # noqa: E402
 from fretwave.mpi.petsc_options import AnalysisOptions  # noqa: E402
 from fretwave.mpi.petsc_share import RunWide  # noqa: E402
+from fretwave.mpi.petsc_time import unread_in_time  # noqa: E402
 from fretwave.mpi.petsc_values import parse  # noqa: E402
 
 pytestmark = pytest.mark.ranks(1)
@@ -59,6 +60,31 @@ def test_it_need_be_read_by_one_route_alone(run, routes: str) -> None:
     assert code == 0 and UNREAD not in said
     code, said = run("mode,mode_epmc", f"{routes} -ksp_gmres_restrat 40")
     assert code == 2 and "no solver reads the PETSc option -ksp_gmres_restrat" in said
+
+
+@pytest.mark.parametrize(
+    ("petsc", "only"),
+    [
+        ("-ts_rtoll 1e-9", "mode,free_decay"),
+        ("-free_decay_ts_adapt_clipp 0.1,5", "mode,free_decay"),
+        ("-forced_time_ts_rtoll 1e-9", "mode,mode_epmc,forced"),
+    ],
+    ids=["of all", "of one analysis", "of the check in time"],
+)
+def test_a_misspelt_one_of_a_time_integration_is_refused_before_anything_is_solved(run, petsc: str, only: str) -> None:
+    """It was found when the first motion began, all modes before it done."""
+    code, said = run(only, petsc, "--set", "forced.time_points=1")
+    name = petsc.split()[0].replace("free_decay_", "").replace("forced_", "")
+    assert code == 2 and f"no solver reads the PETSc option {name}\n" in said and "results in" not in said
+    assert "fix:" in said
+
+
+@pytest.mark.parametrize(
+    "petsc", ["-ts_rtol 1e-9", "-ts_type bdf -ts_bdf_order 3", "-ts_adapt_type dsp -ts_adapt_dsp_filter h211b"]
+)
+def test_names_that_another_method_reads_are_names(petsc: str) -> None:
+    assert not unread_in_time(dict(parse(petsc)))
+    assert unread_in_time(dict(parse(f"{petsc} -ts_bdf_ordr 3 -ts_view"))) == ["ts_bdf_ordr"]
 
 
 def test_the_route_may_stand_in_the_case(run) -> None:

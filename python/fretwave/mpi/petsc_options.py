@@ -9,7 +9,8 @@ from typing import Any
 
 from ..errors import InputError, PetscError
 from ..texts import nearest, shortened
-from .petsc_share import AT_START, SHARED, RunWide, owner
+from .petsc_share import AT_START, SHARED, TIME, RunWide, owner
+from .petsc_time import unread_in_time
 from .petsc_values import ENVIRONMENT, check_value, parse
 
 #: Names to suggest for a misspelt option; PETSc has many more.
@@ -146,10 +147,27 @@ class AnalysisOptions:
             for name in self._unread(unused)
             if not (later and name.startswith(self.prefix + later)) and not self.wide.left_to_others(self.prefix, name)
         ]
-        if not wrong:
-            return
+        if wrong:
+            raise self._without_reader(wrong, where)
+
+    def check_in_time(self, where: str, whole: bool) -> None:
+        """Refuse misspelt options of a time integration before anything is solved: of the `whole` analysis, or a part.
+
+        Raises
+        ------
+        InputError
+            As of `check_used`.
+        """
+        plain = {self._plain(name): value for name, value in self.pairs.items() if name.startswith(self.prefix)}
+        begin = "" if whole else TIME
+        given = {name.removeprefix(begin): value for name, value in plain.items() if name.startswith(begin)}
+        wrong = unread_in_time(given)
+        if wrong:
+            raise self._without_reader([begin + name for name in wrong], where)
+
+    def _without_reader(self, wrong: Sequence[str], where: str) -> InputError:
         plain = wrong[0].removeprefix(self.prefix)
-        raise InputError(
+        return InputError(
             f"no solver reads the PETSc option -{plain}",
             where=where,
             measured=", ".join(f"-{name.removeprefix(self.prefix)}" for name in wrong),

@@ -141,6 +141,7 @@ class Runner:
             {prefix_of(name): self._choosing(self.case.analyses[name]) for name in names},
             self.read,
         )
+        self._check_in_time(names)
         self._greet(names)
         self._reduce([name for name in names if name not in sweeps])
         try:
@@ -154,6 +155,13 @@ class Runner:
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
         return EXIT_DONE
+
+    def _check_in_time(self, names: Sequence[str]) -> None:
+        """Names of options of time integrations, before anything is solved. Collective."""
+        for analysis in (self.case.analyses[name] for name in names):
+            if analysis.integrates():
+                options = AnalysisOptions(prefix_of(analysis.name), [analysis.petsc], self.wide)
+                options.check_in_time(f"analysis '{analysis.name}'", analysis.integrates() == "type")
 
     def _choosing(self, analysis: AnalysisSection) -> dict[str, str | None]:
         """Options of an analysis alone that choose its solvers."""
