@@ -333,6 +333,8 @@ def test_only_given_again_adds_to_what_was_given(tmp_path: Path) -> None:
 def test_options_of_the_time_integration_are_read_after_the_points(tmp_path: Path, capsys) -> None:
     """They were refused, as nothing had read them when the first point was found."""
     given = ["--only", "forced", "--no-plots", "--set", "forced.levels=[2.0]", "--set", "forced.time_points=1"]
-    wrong = ["--set", "forced.petsc=-time_ts_rtol 1e-6 -time_ts_rtoll 3"]
-    assert main(["run", str(CASE), "--out", str(tmp_path / "run"), *given, *wrong]) == 0
-    assert "forced: PETSc options that no solver has read: -time_ts_rtoll\n" in capsys.readouterr().out
+    words = ["run", str(CASE), "--out", str(tmp_path / "run"), *given]
+    assert main([*words, "--set", "forced.petsc=-time_ts_rtol 1e-6 -time_ts_event_tol 3"]) == 0
+    assert "forced: PETSc options that no solver has read: -time_ts_event_tol\n" in capsys.readouterr().out
+    assert main([*words, "--force", "--set", "forced.petsc=-time_ts_rtol 1e-6 -time_ts_rtoll 3"]) == 2
+    assert "fix:      did you mean `-time_ts_rtol`?" in capsys.readouterr().err

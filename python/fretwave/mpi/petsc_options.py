@@ -167,6 +167,7 @@ class AnalysisOptions:
 
     def _without_reader(self, wrong: Sequence[str], where: str) -> InputError:
         plain = wrong[0].removeprefix(self.prefix)
+        begin = TIME if plain.startswith(TIME) else ""
         return InputError(
             f"no solver reads the PETSc option -{plain}",
             where=where,
@@ -174,7 +175,7 @@ class AnalysisOptions:
             expected="options of the solvers in use (a prefix is added by fretwave)",
             fix="remove it: this solver is not in use here (`-snes_view` shows those that are)"
             if plain in COMMON
-            else nearest(plain, (*COMMON, *_tuned()), "did you mean `-{}`?".format)
+            else nearest(plain.removeprefix(begin), (*COMMON, *_tuned()), f"did you mean `-{begin}{{}}`?".format)
             or "remove it; `-snes_view` shows the solvers in use",
         )
 
