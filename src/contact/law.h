@@ -54,9 +54,8 @@ struct Diagnosis {
   std::vector<double> shares = {};
 };
 
-/// Of a diagnosis' shares those of one pair: in contact, and there in slip, of the period as 1. One that is
-/// always in contact and never moves its slider is left what its law says of the samples: a load at rest may
-/// hold it at its limit.
+/// Of a diagnosis' shares those of one pair: in contact, and there in slip, of the period as 1. One that a
+/// load at rest holds at its limit all the period is left its slip, though its slider never moves.
 void set_shares(Diagnosis& diagnosis, size_t pair, double contact, double slip);
 
 /// A pair whose force is linear in its motion but where it changes its state:

@@ -145,3 +145,19 @@ def test_normal_and_tangential_forces_follow_the_law_s_direction() -> None:
     assert (history[0].normal_force.item(), history[0].tangential_force.item()) == (5.0, 5.0)
     assert np.isnan(history[None].normal_force).all()
     assert history[None].tangential_force.item() == pytest.approx(np.sqrt(50.0))
+
+
+@pytest.mark.parametrize("law", ["jenkins", "coulomb_2d", "coulomb_3d"])
+def test_a_pair_that_a_load_brings_to_its_limit_in_an_instant_sticks(comm, law):
+    """Its slider stands there all the period: the one sample at the limit, 1 of 64, was told as slip."""
+    n, tangent = {"jenkins": (1, 0), "coulomb_2d": (2, 1), "coulomb_3d": (3, 1)}[law]
+    friction = {"friction_limit": 0.3} if n == 1 else {"friction_coefficient": 0.3, "normal_load": 1.0, "gap": 0.0}
+    normal = {} if n == 1 else {"normal_stiffness": 5.0}
+    contact = fw.Contact(law, np.eye(n), {"tangential_stiffness": 2.0, **normal, **friction}, law)
+    with fw.Model(np.eye(n), np.diag([3.0, 3.5, 4.0][:n]), None, [contact], comm) as model:
+        rest = fw.static_preload(model, 1.5 * np.eye(n)[tangent])
+        along = [mode for mode in fw.linear_modes(model, n) if abs(mode.shape[tangent]) > 0.9]
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), dof=tangent, start=along[0], rest=rest)
+        branch = fw.follow(problem, 1e-3, 1e-2, errors=False)
+        shares = problem.contact_history(branch.unknowns(0))[0]["shares"].ravel()
+    assert shares.tolist() == [1, 0, 0] and branch["slip"][0] == 0 and branch["zeta"][0] == 0

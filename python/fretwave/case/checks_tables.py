@@ -87,21 +87,23 @@ def implied_preload(source: Source, contacts: Sequence[Contact], notes: list[str
 
     Only of laws with a memory; others may be integrated in time, which knows no preload: they move the structure.
     """
-    pressing = {} if "preload" in source.data else {c.name: what for c in contacts if (what := _pressing(c))}
+    pressing = {} if "preload" in source.data else {c.name: told for c in contacts if (told := _pressing(c))}
     kept = [c.name for c in contacts if c.info.memory and c.name in pressing]
-    for name, what in pressing.items():
+    for name, (role, what) in pressing.items():
         said = f"contact '{name}': its {what}"
         if kept:
             said += " is taken as balanced, for there is no [preload]; `[preload] balanced = false` lets it move the"
             notes.append(f"{said} structure")
-        elif what.startswith("gap"):
+        elif role is Role.GAP:
             notes.append(f"{said} moves the structure, for there is no [preload], which takes it as balanced")
     return PreloadSection() if kept else None
 
 
-def _pressing(contact: Contact) -> str:
-    """What presses a contact's pairs without displacement, in words."""
+def _pressing(contact: Contact) -> tuple[Role, str] | None:
+    """What presses a contact's pairs without displacement, also in words."""
     load, gap = contact.value(Role.LOAD), contact.value(Role.GAP)
     if load is not None and np.any(load):
-        return str(contact.info.named(Role.LOAD))
-    return "" if gap is None or np.min(gap, initial=0.0) >= 0 else f"{contact.info.named(Role.GAP)} (an interference)"
+        return Role.LOAD, str(contact.info.named(Role.LOAD))
+    if gap is None or np.min(gap, initial=0.0) >= 0:
+        return None
+    return Role.GAP, f"{contact.info.named(Role.GAP)} (an interference)"

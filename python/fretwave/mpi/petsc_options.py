@@ -11,7 +11,7 @@ from ..errors import InputError, PetscError
 from ..texts import nearest, shortened
 from .petsc_share import AT_START, SHARED, TIME, RunWide, owner
 from .petsc_time import unread_in_time
-from .petsc_values import ENVIRONMENT, check_value, parse
+from .petsc_values import ENVIRONMENT, check_value, names_of, parse
 
 #: Names to suggest for a misspelt option; PETSc has many more.
 COMMON = (
@@ -216,11 +216,6 @@ def unread_outside(unused: Sequence[str], wide: RunWide) -> str:
     example = "" if names and SHARED.match(names[0]) else next(iter(wide.kinds), "")
     own = f" (an analysis' own begin with its name: -{example}{names[0]})" if names and example else ""
     return said_unread(names, f" of {ENVIRONMENT},") + own if names else ""
-
-
-def names_of(unused: Sequence[str]) -> list[str]:
-    """Of options as PETSc lists them, with their values."""
-    return [re.split(r"[ =]", text.lstrip("-"))[0] for text in unused]
 
 
 def _tuned() -> set[str]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .petsc_values import names_of
+
 #: What the options of PETSc's TS begin with.
 BEGIN = "ts_"
 #: Of those read later than where a TS takes its options, or which open files and windows there.
@@ -19,7 +21,6 @@ def unread_in_time(given: Mapping[str, str | None]) -> list[str]:
     from petsc4py import PETSc
 
     from .._core import unused_options
-    from .petsc_options import names_of
 
     mine = {name: value for name, value in given.items() if name.startswith(BEGIN) and not name.startswith(LATER)}
     database: Any = PETSc.Options()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from ..errors import InputError
 from ..texts import shortened
@@ -61,6 +61,11 @@ def parse(text: str) -> list[tuple[str, str | None]]:
             raise _too_late(name, value)
         check_value(name, value, "--petsc, or petsc = ... of an analysis")
     return pairs
+
+
+def names_of(unused: Sequence[str]) -> list[str]:
+    """Of options as PETSc lists them, with their values."""
+    return [re.split(r"[ =]", text.lstrip("-"))[0] for text in unused]
 
 
 def check_value(name: str, value: str | None, where: str) -> None:
