@@ -142,12 +142,11 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
     return "the branch bends more than a step resolves";
   if (may_shorten)
     return leads_back(trial) || fell_back(trial) ? "the corrector lands on another branch" : "";
-  if (angle < kink_angle)
-    return round_facet(anchor_.y, trial.y) && orientation(trial.y, trial.tangent) < 0
-               ? "the corrector lands on another branch"
-               : "";
-  const int sign =
-      beyond_corner(trial) && !round_facet(anchor_.y, trial.y) ? 1 : orientation(trial.y, trial.tangent);
+  const bool round = round_facet(anchor_.y, trial.y);
+  if (angle < kink_angle && !round) return "";
+  const int sign = beyond_corner(trial) && !round ? 1 : orientation(trial.y, trial.tangent);
+  if (sign < 0 && round && (angle < kink_angle || just_touched()))
+    return "the corrector lands on another branch";
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
   if (sign < 0) {
     check(VecScale(trial.tangent, -1));
@@ -180,6 +179,7 @@ std::optional<Continuation::Trial> Continuation::turn_fine_corner(double& length
 }
 
 std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> behind, double& length) {
+  if (behind && just_touched() && round_facet(anchor_.y, behind->y)) behind.reset();
   turned_ = bool(behind);
   if (turned_) length = distance(behind->y, anchor_.y);
   return behind;

@@ -151,13 +151,13 @@ class Continuation {
   double within_piece(Vec y, Vec tangent, double reach);
   int into_piece(Vec y, Vec tangent, double reach);
   std::optional<Trial> turn_corner(double beyond, double reach, bool seen);
-  std::optional<Trial> along_piece(Vec y, Vec tangent, double reach, double aside);
+  std::optional<Trial> along_piece(Vec y, Vec tangent, double reach, double aside, double least);
 
   // Where it touches a facet (round_facet.cpp)
   bool round_facet(Vec a, Vec b);
   bool on_other_sheet(Trial const&, Trial const&);
   VecHandle stiffest();
-  std::optional<VecHandle> across_round_facet();
+  bool just_touched();
   std::optional<Trial> turn_round_facet(Vec across, double length);
   std::optional<Trial> behind_touched_facet(double& length);
 
@@ -202,7 +202,7 @@ class Continuation {
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, circles_ = 0, crawled_ = 0;
   bool way_ = false, upwards_ = true, taken_over_ = false, turned_ = false, finely_ = false, wary_ = false,
-       touching_ = false, finished_ = false, converged_ = false;
+       finished_ = false, converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
   std::string reason_;

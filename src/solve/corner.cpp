@@ -220,20 +220,20 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   const int sign = placed ? placed : told;
   if (sign == 0) return {};
   check(VecScale(tangent, sign));
-  auto trial = along_piece(there, tangent, reach, beyond);
+  auto trial = along_piece(there, tangent, reach, beyond, std::cos(steps_.max_angle));
   if (trial && !placed && orientation(trial->y, trial->tangent) < 0) return {};
   return trial;
 }
 
 /// A solution along the tangent of the piece that y lies on, which is off the branch by `aside`.
-std::optional<Continuation::Trial> Continuation::along_piece(Vec y, Vec tangent, double reach, double aside) {
+std::optional<Continuation::Trial> Continuation::along_piece(Vec y, Vec tangent, double reach, double aside,
+                                                             double least) {
   const double on = within_piece(y, tangent, reach);
   if (!(on > shortest)) return {};
   const VecHandle row = weighted(weights_, tangent), guess = moved(y, on, tangent);
   Trial trial = at(copy(guess));
   if (!correct(trial, row, dot(row, guess), row)) return {};
   if (!(distance(trial.y, guess) <= aside + on)) return {};
-  const double least = touching_ && round_facet(anchor_.y, trial.y) ? 0 : std::cos(steps_.max_angle);
   if (!(dot(row, trial.tangent) >= least)) return {};
   return trial;
 }

@@ -18,9 +18,9 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr double least = 1e-15, most = 1e-3;  // way across, in unknowns
-constexpr double longest = 1e-4;              // step in which such a facet is passed
-constexpr int powers = 3, halvings = 4;
+constexpr double longest = 1e-4, nearer = 2;              // steps in which such a facet is passed
+constexpr double shallow = 0.01, deep = 100, deeper = 3;  // across, in squares of these
+constexpr int powers = 3;
 
 }  // namespace
 
@@ -54,23 +54,11 @@ VecHandle Continuation::stiffest() {
   return across;
 }
 
-/// From the anchor to just across a facet of this kind, if one lies nearby. Collective.
-std::optional<VecHandle> Continuation::across_round_facet() {
-  const VecHandle across = stiffest();
-  for (const double way : {1.0, -1.0})
-    for (double far = least; far <= most; far *= 10) {
-      if (!round_facet(anchor_.y, moved(anchor_.y, way * far, across))) continue;
-      double near = far / 10;
-      for (int k = 0; k < halvings; ++k) {
-        const double middle = std::sqrt(near * far);
-        (round_facet(anchor_.y, moved(anchor_.y, way * middle, across)) ? far : near) = middle;
-      }
-      return moved(anchor_.y, way * far, across);
-    }
-  return {};
-}
+/// Whether the branch has just come over such a facet: it leaves it first, while the sheets are so near to
+/// each other that Newton finds either. Collective.
+bool Continuation::just_touched() { return before_.y && round_facet(before_.y, anchor_.y); }
 
-/// The branch behind such a facet, by the tangent just across it. Collective.
+/// The branch behind such a facet, by a tangent across it. Collective.
 std::optional<Continuation::Trial> Continuation::turn_round_facet(Vec across, double length) {
   VecHandle tangent = copy(anchor_.tangent);
   newton_.system().close(row_, 0);
@@ -79,26 +67,25 @@ std::optional<Continuation::Trial> Continuation::turn_round_facet(Vec across, do
   if (!std::isfinite(size)) return {};
   check(VecScale(tangent, anchor_sign() * determinant(across, weighted(weights_, tangent)) / size));
   finely_ = true;
-  auto trial = along_piece(across, tangent, length, length);
+  auto trial = along_piece(across, tangent, length, length, 0);
   finely_ = false;
   if (!trial || !round_facet(anchor_.y, trial->y) || orientation(trial->y, trial->tangent) <= 0) return {};
   return trial;
 }
 
-/// The same where no step leads on. The tangent turns with the root of the distance, and by much in the
-/// shortest step that can be made. Collective.
+/// The same where no step leads on: by tangents from as far across as the branch is there, some square of the
+/// length. Collective.
 std::optional<Continuation::Trial> Continuation::behind_touched_facet(double& length) {
-  if (!anchor_sign()) return {};
-  const auto across = across_round_facet();
-  if (!across) return {};
-  for (double reach = longest; reach >= steps_.minimum; reach /= 2) {
-    length = reach;
-    touching_ = true;
-    auto trial = turn_fine_corner(length);
-    if (!trial) trial = turned(turn_round_facet(*across, length), length);
-    touching_ = false;
-    if (trial) return trial;
-  }
+  if (!anchor_sign() || just_touched()) return {};
+  const VecHandle across = stiffest();
+  const auto here = problem_.piece(anchor_.y, true);
+  for (length = longest; length >= steps_.minimum; length /= nearer)
+    for (double way = shallow; way < deep; way *= deeper)
+      for (const double side : {1.0, -1.0}) {
+        const VecHandle there = moved(anchor_.y, side * way * length * length, across);
+        if (problem_.piece(there, true) == here) continue;
+        if (auto trial = turn_round_facet(there, length)) return turned(std::move(trial), length);
+      }
   return {};
 }
 

@@ -70,9 +70,9 @@ def told(branch):
 
 
 @pytest.mark.ranks(1, 2)
-@pytest.mark.parametrize("seed", [247, 394], ids=["ended there", "turned back onto itself"])
+@pytest.mark.parametrize("seed", [247, 394, 3120])
 def test_a_mode_leads_on_behind_a_facet_that_it_touches(comm, seed):
-    """One begins to go round behind a right turn, of the other products along the facet told the wrong way."""
+    """Two ended where a slider begins to go round, one turned back onto itself by products along the facet."""
     branch, shortly = followed(comm, seed), followed(comm, seed, initial=0.02, maximum=0.06)
     assert branch.converged, branch.reason
     assert told(branch) == pytest.approx(told(shortly), rel=1e-9)
