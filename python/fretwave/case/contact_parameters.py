@@ -28,6 +28,11 @@ LARGEST = float(np.finfo(float).max)
 LONGEST_SYMBOL = 4
 
 
+def has_per_area(parameter: ParameterInfo) -> bool:
+    """Forces and stiffnesses may be given per area; coefficients and gaps may not."""
+    return quantity(parameter.unit).startswith("force")
+
+
 def law_of(
     source: Source, number: int, section: ContactSection, laws: Mapping[str, LawInfo], found: list[FretwaveError]
 ) -> LawInfo | None:
@@ -75,9 +80,7 @@ def parameters_of(
     path = ("contact", number)
     known = {parameter.name: parameter for parameter in law.parameters}
     areas = given.areas if given else None
-    per_area = (
-        [] if areas is None else [name + PER_AREA for name, p in known.items() if quantity(p.unit).startswith("force")]
-    )
+    per_area = [] if areas is None else [name + PER_AREA for name, p in known.items() if has_per_area(p)]
     before, meant = len(found), set[Optional[str]]()
     for key in section.model_extra or {}:
         if key not in known and key not in per_area:

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from ..registry import kinds
 from ..units import quantity
-from .contact_parameters import PER_AREA
+from .contact_parameters import PER_AREA, has_per_area
 from .pair_values import TABLE
 from .schema import (
     TOP_LEVEL,
@@ -149,6 +149,7 @@ def _parameters(law: LawInfo) -> Schema:
         name: _parameter(parameter, per_area)
         for parameter in law.parameters
         for name, per_area in ((parameter.name, ""), (parameter.name + PER_AREA, " per area"))
+        if not per_area or has_per_area(parameter)
     }
 
 

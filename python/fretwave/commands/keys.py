@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
+from typing import Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from ..case.analysis import AnalysisSection
 from ..case.analysis_tables import Damper, MistuningSection, StepSection
+from ..case.contact_parameters import PER_AREA, has_per_area
 from ..case.json_schema import json_text
 from ..case.observed import ObservedTable
 from ..case.plugins import read_plugins
@@ -29,8 +31,14 @@ from ..case.schema import (
 )
 from ..case.toml.source import Source
 from ..case.toml.validation import describe
-from ..errors import CaseErrors, FretwaveError
+from ..errors import CaseErrors, FretwaveError, InputError
+from ..model.law_info import LawInfo
 from ..registry import kinds
+from ..results.model_file import read_sources
+from ..units import SI, SYSTEMS
+
+#: What stands at the top level and is no section with keys of its own.
+LINES = ("title", "plugins", "quick")
 
 
 def key_lines(case: Path | None = None) -> Iterator[str]:
@@ -38,13 +46,15 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
 
     Parameters
     ----------
-    case : whose plug-ins' analyses are listed too, and in whose units; without it units are of quantities
+    case : whose plug-ins' analyses and laws are listed too, and in whose units; without it units are of quantities
     """
     if case is not None:
         _load_plugins(case)
-    units = str if case is None else Source(case).units
+    from ..model.laws import laws
+
+    units = str if case is None else _symbols(Source(case))
     yield "top level"
-    yield from (f"  {name:<18} {'':<12} {text}" for name, text in TOP_LEVEL.items() if name in ("title", "plugins"))
+    yield from (f"  {name:<18} {'':<12} {text}" for name, text in TOP_LEVEL.items() if name in LINES)
     sections: dict[str, type[BaseModel]] = {
         "[model]": ModelSection,
         "[reduction]": ReductionSection,
@@ -52,7 +62,7 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
         "[damping]": DampingSection,
         "[aerodynamics]": AerodynamicsSection,
         "[uncertainty]": UncertaintySection,
-        "[[contact]] (and the parameters of its law)": ContactSection,
+        "[[contact]] (and the parameters of its law: numbers, lists or .csv files, one value a pair)": ContactSection,
         "[material]": MaterialSection,
         "[[gauge]]": GaugeSection,
         "[[analysis]]": AnalysisSection,
@@ -60,6 +70,9 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
     for title, section in sections.items():
         yield title
         yield from _section(section, units)
+        if section is ContactSection:
+            for law in laws().values():
+                yield from _law(law, units)
     for kind, analysis in kinds().items():
         yield f'[[analysis]] with type = "{kind}"'
         yield from _section(analysis, units, without=set(AnalysisSection.model_fields))
@@ -85,6 +98,18 @@ def schema_text(case: Path | None = None) -> str:
     return json_text(laws())
 
 
+def _symbols(source: Source) -> Callable[[str], str]:
+    """The units that the case or its model file declares; quantities where only its builder knows, or no file is."""
+    model = source.data.get("model")
+    model = model if isinstance(model, dict) else {}
+    if "units" in model or not {"file", "builder"} & set(model):
+        return source.units
+    try:
+        return SYSTEMS.get(read_sources(source.path.parent / str(model["file"]))[0], SI)
+    except (KeyError, InputError):
+        return str
+
+
 def _load_plugins(case: Path) -> None:
     source, found = Source(case), list[FretwaveError]()
     read_plugins(source, found)
@@ -95,7 +120,24 @@ def _load_plugins(case: Path) -> None:
 def _section(section: type[BaseModel], units: Callable[[str], str], without: Collection[str] = ()) -> Iterator[str]:
     for name, field in section.model_fields.items():
         if name not in without:
-            yield f"  {name:<18} {_default(field):<12} {describe(field, units)}"
+            yield f"  {name:<18} {_default(field):<12} {describe(field, units)}{_choices(field.annotation)}"
+
+
+def _choices(annotation: object) -> str:
+    """The words that a key takes, where it takes no others."""
+    if get_origin(annotation) is Literal:
+        return f" (one of {', '.join(map(str, get_args(annotation)))})"
+    return next(filter(None, map(_choices, get_args(annotation))), "")
+
+
+def _law(law: LawInfo, units: Callable[[str], str]) -> Iterator[str]:
+    of = {1: "one direction", 2: "normal and tangent", 3: "normal and two tangents"}[law.components]
+    yield f'[[contact]] with law = "{law.name}": {law.doc} ({of})'
+    for parameter in law.parameters:
+        default = "required" if parameter.default is None else str(parameter.default)
+        also = f", or `{parameter.name}{PER_AREA}`" if has_per_area(parameter) else ""
+        unit = "" if parameter.unit == "-" else f" [{units(parameter.unit)}]"
+        yield f"  {parameter.name:<18} {default:<12} {parameter.doc}{unit}{also}"
 
 
 def _default(field: FieldInfo) -> str:
