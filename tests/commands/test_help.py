@@ -7,6 +7,8 @@ from importlib.metadata import version
 import pytest
 from command_line import call
 
+from fretwave.run.at_rest import MOST_DOFS
+
 pytestmark = pytest.mark.ranks(1)
 
 COMMANDS = ("init", "run", "check", "sweep", "resume", "show", "report", "plot", "probe", "view", "import", "study")
@@ -26,10 +28,16 @@ def test_version(capfd) -> None:
     assert capfd.readouterr().out == f"fretwave {version('fretwave')}\n"
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", (*COMMANDS, "stress"))
 def test_every_command_has_its_help(name: str, capfd) -> None:
     assert call(name, "--help") == 0
-    assert f"usage: fretwave {name}" in capfd.readouterr().out
+    said = capfd.readouterr().out
+    assert f"usage: fretwave {name}" in said and "``" not in said
+
+
+def test_the_help_of_check_says_which_wheels_it_leaves(capfd) -> None:
+    assert call("check", "--help") == 0
+    assert f"more than {MOST_DOFS:,} dofs" in " ".join(capfd.readouterr().out.split())
 
 
 def test_two_ranks_say_it_once(launch) -> None:

@@ -60,6 +60,25 @@ def test_the_short_form_has_what_happened(printed) -> None:
         assert any(said in line for line in lines), said
 
 
+SLOW = """
+import time
+import numpy as np
+import fretwave as fw
+def build():
+    time.sleep(2.0)
+    return fw.Structure(np.eye(1), 4.0 * np.eye(1), names=["m1"])
+"""
+
+
+def test_the_time_of_a_run_has_that_of_its_builder(tmp_path: Path, capfd) -> None:
+    """Of `blisk_ring` it said 26 s after 90."""
+    (tmp_path / "slow.py").write_text(SLOW)
+    text = '[model]\nbuilder = "slow.py"\n[[analysis]]\nname = "modes"\ntype = "linear"\nmodes = 1\n'
+    (tmp_path / "case.toml").write_text(text)
+    assert call("run", tmp_path / "case.toml", "--no-plots", "--out", tmp_path / "run") == 0
+    assert int(re.findall(r"done after (\d+) s", capfd.readouterr().out)[0]) >= 2
+
+
 UNREAD = 141  #: as shells count SIGPIPE
 
 

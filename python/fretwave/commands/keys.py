@@ -132,7 +132,8 @@ def _choices(annotation: object) -> str:
 
 def _law(law: LawInfo, units: Callable[[str], str]) -> Iterator[str]:
     of = {1: "one direction", 2: "normal and tangent", 3: "normal and two tangents"}[law.components]
-    yield f'[[contact]] with law = "{law.name}": {law.doc} ({of})'
+    said = f": {law.doc}" if law.doc else ""
+    yield f'[[contact]] with law = "{law.name}" ({of}){said}'
     for parameter in law.parameters:
         default = "required" if parameter.default is None else str(parameter.default)
         also = f", or `{parameter.name}{PER_AREA}`" if has_per_area(parameter) else ""

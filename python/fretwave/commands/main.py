@@ -129,11 +129,16 @@ def parser() -> argparse.ArgumentParser:
         help="check a case and say what would run",
         description="Checks a case, solves its state at rest and says what would run: pairs that stick, slip and are"
         " open, the linear mode, the amplitude at which it expects the first pair to slip, and warnings about what"
-        " looks wrong, none of which changes the exit code. Of a whole wheel the state at rest is not solved.",
+        " looks wrong, none of which changes the exit code. Of a whole wheel of more than"
+        " 20,000 dofs the state at rest is left to the run.",
     )
     _add_case(check, optional=True)
     check.add_argument("--no-solve", action="store_true", help="leave out the state at rest")
-    check.add_argument("--keys", action="store_true", help="list all keys instead, with those of a case's plug-ins")
+    check.add_argument(
+        "--keys",
+        action="store_true",
+        help="list all keys and contact laws instead, with those of a case's plug-ins, in its units",
+    )
     check.add_argument("--schema", action="store_true", help="print the JSON schema of case files instead, for editors")
     check.set_defaults(command=_check)
     _add_sweep(commands)

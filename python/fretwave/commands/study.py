@@ -66,7 +66,12 @@ def _from(least: int) -> Any:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="fretwave study", description=__doc__)
+    parser = Parser(
+        prog="fretwave study",
+        description="Runs a mode, a forced response or wear over harmonics, samples, tolerances, accuracies and"
+        " numbers of component modes (options, else [study] of the case), each with the others at their finest, and"
+        " writes error against run time as a table and a picture.",
+    )
     parser.add_argument("case", type=Path, metavar="CASE", help="case file (TOML)")
     parser.add_argument(
         "--analysis",
@@ -94,7 +99,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help=f"amplitudes of a mode or frequencies at which runs are compared (default {COMPARED})",
     )
-    parser.add_argument("--repeats", type=_from(1), default=REPEATS, help="times each run is repeated (default 3)")
+    parser.add_argument(
+        "--repeats", type=_from(1), default=REPEATS, metavar="N", help=f"times each run is repeated (default {REPEATS})"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
     add_shown(parser)
     add_force(parser)

@@ -51,10 +51,11 @@ def run_case(path: Path, options: RunOptions, comm: MPI.Comm) -> int:
     """Run a case from its start; returns the exit code. Collective."""
     from .. import _core  # noqa: F401  # PETSc starts on all ranks at once, not with what one of them does alone
 
+    clock = Estimate()
     case = on_first_rank(comm, lambda: load_case(path, options.overrides, options.quick))
     folder = results_folder(options.out, case.name, comm)
     record = comm.bcast(new_record(options.given(path, case), comm.size) if comm.rank == 0 else None)
-    return Runner(case, options, folder, record, comm).run()
+    return Runner(case, options, folder, record, comm, clock=clock).run()
 
 
 def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True, shown: Shown = Shown.SHORT) -> int:
@@ -67,10 +68,11 @@ def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True, shown: Shown = 
     """
     from .. import _core  # noqa: F401
 
+    clock = Estimate()
     case, record = on_first_rank(comm, lambda: reload_case(folder))
     options = RunOptions.of_record(folder, record, plots, shown)
     record["ranks"], record["status"] = comm.size, "running"
-    return Runner(case, options, folder, record, comm, resuming=True).run()
+    return Runner(case, options, folder, record, comm, resuming=True, clock=clock).run()
 
 
 def _nothing() -> None:
@@ -78,7 +80,10 @@ def _nothing() -> None:
 
 
 class Runner:
-    """One run of some analyses of a case; `part` when it is one of a sweep, which speaks for it."""
+    """One run of some analyses of a case; `part` when it is one of a sweep, which speaks for it.
+
+    `clock` runs from before the case was read: builders and reductions may take most of it.
+    """
 
     def __init__(
         self,
@@ -89,12 +94,13 @@ class Runner:
         comm: MPI.Comm,
         resuming: bool = False,
         part: bool = False,
+        clock: Estimate | None = None,
     ) -> None:
         self.case, self.options, self.comm, self.resuming = case, options, comm, resuming
         active = comm.rank == 0
         self.folder = RunFolder(folder, record, case.text, active, resuming, options.force)
         self.console = Console(active, self.folder.log, shown=Shown.NOTHING if part else options.shown)
-        self.part, self.time, self.wide = part, Estimate(), RunWide()
+        self.part, self.clock, self.wide = part, clock or Estimate(), RunWide()
         self.failures: list[NotConverged] = []
         #: PETSc options that something has read.
         self.read: set[str] = set()
@@ -400,7 +406,7 @@ class Runner:
         self.folder.record["peak_memory_mb"] = peak_memory_mb(self.comm)
         if self.options.plots and self.folder.started:
             on_first_rank(self.comm, lambda: plot(self.folder.path, self.console))
-        word, seconds = self.folder.record["status"], self.time.passed()
+        word, seconds = self.folder.record["status"], self.clock.passed()
         self.console.line(
             f"{word} after {duration(seconds)}; `fretwave show {display(self.folder.path)}` lists the results"
         )

@@ -25,11 +25,11 @@ def geometry(case: Case) -> Structure:
     given = case.structure.cut or case.structure
     if given.coordinates is None:
         raise InputError(
-            "the model cannot be drawn: it has no nodes",
+            "the model cannot be shown: it has no nodes",
             display(case.path),
             "no coordinates of nodes with three displacements each",
             "a builder that gives coordinates (and hexahedra), or a model file with coordinates",
-            "give Structure its coordinates, or import with --coordinates; `fretwave plot` needs neither",
+            "give Structure its coordinates, or import with --coordinates; `plot` and `probe --dof` need neither",
         )
     return given
 
