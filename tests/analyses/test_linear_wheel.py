@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.linalg
+from command_line import call
 from models.linear_cases import CONTACT, GROUND, MASS, NEXT, ring
 from models.solved_case import tables_of
 from tolerances import REPEATED, TIGHT
@@ -266,6 +267,17 @@ def test_what_is_of_no_wheel_is_refused(name, tmp_path):
     with pytest.raises(CaseErrors, match=place) as caught:
         load_case(path)
     assert expected in str(caught.value) and str(caught.value).count("fix:") == 1
+
+
+@pytest.mark.ranks(1)
+def test_a_response_without_damping_is_refused_by_check(tmp_path, capfd):
+    """It was found by the run alone, once all modes of the wheel were, and said no analysis."""
+    path = tmp_path / "case.toml"
+    for dampers, code in (("", 2), ('dampers = [{ dof = "mass", c = 0.1 }]\n', 0)):
+        path.write_text(text(WHEEL + "modes = 1\n" + FORCED + dampers), encoding="utf-8")
+        assert call("check", path) == code
+    said = capfd.readouterr().err
+    assert said.count("without damping has no peak") == 1 and "', engine_order" in said
 
 
 def test_a_response_without_damping_is_refused(solve):

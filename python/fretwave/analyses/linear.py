@@ -29,11 +29,13 @@ from .parts.asymptotes import sector_phase
 from .parts.context import AnalysisContext, Outcome
 from .parts.gyroscopic import gyroscopic_lines, gyroscopic_shift
 from .parts.linear_waves import columns_of, crossings_of, modes_of_wave
-from .parts.linear_wheel import AMPLIFICATION, AROUND, amplification_lines, amplifications, around_wheel
+from .parts.linear_wheel import AMPLIFICATION, AROUND, amplification_lines, amplifications, around_wheel, undamped
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from ..case.facts import Facts
     from ..case.reporter import Reporter
+    from ..errors import InputError
     from ..model.modes import LinearMode
 
 #: Time samples of a period in views.
@@ -151,6 +153,12 @@ class LinearAnalysis(AnalysisSection):
                 fix = f"take it out, or add {excited} to nodal_diameters"
                 expected = f"an order of its waves; {order} excites {counted(excited, 'nodal diameter')}"
                 report.wrong(("engine_orders", index), "excites none of the waves", expected, fix)
+
+    def check_chosen(self, case: Case) -> list[InputError]:
+        """The response to an engine order needs damping; of single modes that lack it the run says so."""
+        if self.engine_order is None or case.damped(self.dampers).C is not None:
+            return []
+        return [undamped(self.name, "no damping")]
 
     def _check_wheel(self, report: Reporter, facts: Facts) -> None:
         if self.wheel and facts.model_known and facts.neighbours is None:

@@ -82,7 +82,8 @@ def amplifications(
     for limit, modes in found.items():
         with limit_model(context.tuned, context.comm, limit, wave) as model:
             tuned = _tuned(context, model, wave)
-        every = _damped(modes, np.array([_observed(context, mode) for mode in modes]), _damping(context, modes))
+        places = np.array([_observed(context, mode) for mode in modes])
+        every = _damped(context.analysis, modes, places, _damping(context, modes))
         last = min(tuned.omega.max(), every.omega.max()) if len(modes) < context.case.structure.n_dof else np.inf
         for number, window in enumerate(_windows(context, tuned), 1):
             if (
@@ -120,7 +121,7 @@ def _tuned(context: AnalysisContext[LinearAnalysis], model: Model, wave: int) ->
     C, theta = case.damped(analysis.dampers).C, 2 * np.pi * wave / context.wheel.sectors
     damping = np.zeros((len(modes), len(modes))) if C is None else shapes.conj() @ in_wave(C, shapes.T, theta)
     dof = case.dof(str(analysis.observe))
-    return _damped(modes, shapes[:, dof : dof + 1], np.asarray(damping, dtype=complex))
+    return _damped(analysis, modes, shapes[:, dof : dof + 1], np.asarray(damping, dtype=complex))
 
 
 def _damping(context: AnalysisContext[LinearAnalysis], modes: Sequence[LinearMode]) -> Complex:
@@ -131,17 +132,19 @@ def _damping(context: AnalysisContext[LinearAnalysis], modes: Sequence[LinearMod
     return none if C is None else np.asarray(shapes.conj() @ (C @ shapes.T))
 
 
-def _damped(modes: Sequence[LinearMode], places: Complex, damping: Complex) -> Family:
+def undamped(name: str, measured: str) -> InputError:
+    """What is said of a response that has no peak."""
+    what = "the response of a mode without damping has no peak"
+    fix = "add for example `[damping]` with `zeta = 0.001`"
+    return InputError(what, f"analysis '{name}', engine_order", measured, "damping of every mode", fix)
+
+
+def _damped(analysis: LinearAnalysis, modes: Sequence[LinearMode], places: Complex, damping: Complex) -> Family:
     """Modes whose response is bounded: all that are not rigid are damped."""
     found = Family(np.array([mode.omega for mode in modes]), places, damping)
     own = np.where(found.omega > 0, np.real(np.diagonal(damping)), np.inf)
     if (own <= 0).any():
-        measured, fix = (
-            f"mode {int(np.argmin(own)) + 1} is not damped",
-            "add for example `[damping]` with `zeta = 0.001`",
-        )
-        what = "the response of a mode without damping has no peak"
-        raise InputError(what, "engine_order", measured, "damping of every mode", fix)
+        raise undamped(analysis.name, f"mode {int(np.argmin(own)) + 1} is not damped")
     return found
 
 
