@@ -13,7 +13,7 @@ from ..errors import FretwaveError, InputError
 from ..model.checks import NAMES
 from ..model.sectors import Sparse
 from ..results.model_file import read_sources
-from ..texts import display, is_there, nearest, shortened
+from ..texts import display, is_there, names_beside, nearest, shortened
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 
@@ -70,8 +70,7 @@ def _from_rows(letter: str, rows: list[list[float]], source: Source, key: KeyPat
 
 def _read(path: Path, letter: str, where: str, key: KeyPath, notes: list[str]) -> Sparse:
     if not is_there(path):
-        folder = path.parent
-        names = sorted(entry.name for entry in folder.iterdir()) if is_there(folder) and folder.is_dir() else []
+        names = [name for name in names_beside(path) if name.lower().endswith(READ)]
         raise InputError(
             f"the file of the {NAMES[letter]} does not exist",
             where=where,

@@ -67,9 +67,8 @@ class ValueTable:
     def _rows(self) -> Iterator[tuple[int, str, str]]:
         """Line, number and value of each row that is not empty."""
         if not is_there(self.path):
-            fix = (
-                nearest(self.path.name, names_beside(self.path)) or "check the path, which is relative to the case file"
-            )
+            near = nearest(self.path.name, names_beside(self.path, f"*{TABLE}"))
+            fix = near or "check the path, which is relative to the case file"
             self._wrong("does not exist", None, display(self.path), "a CSV file", fix)
         try:
             lines = list(csv.reader(self.path.read_text(encoding="utf-8-sig").splitlines()))

@@ -271,7 +271,7 @@ def _opened(path: Path) -> h5py.File:
 
     fix = "write it with `fretwave import`"
     if not path.is_file():
-        near = nearest(path.name, names_beside(path))
+        near = nearest(path.name, names_beside(path, "*.h5"))
         raise InputError("the model file does not exist", display(path), fix=near or fix)
     try:
         check_whole(path, "the model file")

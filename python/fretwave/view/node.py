@@ -100,7 +100,8 @@ def of_dof(group: h5py.Group, folder: Path, name: str, point: int) -> NodeMotion
     dofs = [text.decode() for text in group["dof"][()]]
     if name not in dofs:
         listed = ", ".join(dofs[:NAMED]) + (f", ... ({len(dofs)} in all)" if len(dofs) > NAMED else "")
-        near = _meant(folder, name, dofs) or f"--dof {dofs[0]}, or --node for a node of the mesh"
+        first = next((dof for dof in dofs if dof.startswith(f"{name}@")), dofs[0])
+        near = _meant(folder, name, dofs) or f"--dof {first}, or --node for a node of the mesh"
         raise InputError("the results keep no such dof", display(folder), name, listed, near)
     rows = np.asarray(group["coefficients"][point])[[dofs.index(name)]]
     hz = float(group["points/frequency_hz"][point])
