@@ -128,6 +128,24 @@ def test_wear_by_amplitude(tmp_path: Path, capsys) -> None:
     assert "wear: coefficient = 2e-13, line 2: a = 3e-06 m: zeta" in shown and "after 8 cycles" in shown
 
 
+@pytest.mark.parametrize(
+    "over", ["wear.coefficient=1e-13,2e-13", "contact.pads.friction_coefficient=0.4,0.8"], ids=["k_w", "mu"]
+)
+def test_wear_after_other_numbers_of_vibrations_is_said(tmp_path: Path, capsys, over: str) -> None:
+    """A normalised cycle is 1 / (k_w mean(kn / I) 4 mean(mu N / kt)) unless it is given: another one for each value."""
+    path, words = write_case(tmp_path), ["--over", over, "--only", "mode,wear", "--set", "wear.amplitude=[2e-6]"]
+    own, given = tmp_path / "own", tmp_path / "given"
+    assert call("sweep", path, *words, "--out", own) == 0
+    one = 1 / (1e-13 * 1.5e7 / 2e-4 * 4 * 0.4 * 15.0 / 4e6)
+    assert column(own / "summary.csv", "cycle_unit", analysis="wear") == pytest.approx([one, one / 2], rel=SOLVED)
+    note = "wear: a normalised cycle is 1.111e+07 to 2.222e+07 vibrations, by the value"
+    assert note in capsys.readouterr().out
+    assert call("show", own) == 0 and note in capsys.readouterr().out
+    assert call("sweep", path, *words, "--set", "wear.cycle_unit=1e7", "--out", given) == 0
+    assert column(given / "summary.csv", "cycle_unit", analysis="wear").tolist() == [1e7, 1e7]
+    assert "a normalised cycle is" not in capsys.readouterr().out
+
+
 def test_states_at_rest(tmp_path: Path, capsys) -> None:
     """One closed pair, which bears its load."""
     text = POINT + '[[analysis]]\nname = "rest"\ntype = "static"\n'

@@ -22,6 +22,7 @@ AMPLIFIED = "amplifications"
 WEAR = (
     Column("amplitude", "length", "modal amplitude"),
     Column("last_cycles", "1", "normalised wear cycles at the end"),
+    Column("cycle_unit", "1", "vibrations in a normalised wear cycle"),
     Column("worn_volume", "length^3", "worn volume of all faces at the end"),
     Column("new_zeta", "1", "modal damping ratio when new"),
     Column("largest_zeta", "1", "largest modal damping ratio over wear"),
@@ -29,6 +30,8 @@ WEAR = (
     Column("new_frequency_hz", "Hz", "frequency when new"),
     Column("last_frequency_hz", "Hz", "frequency at the end of wear"),
 )
+#: Of normalised cycles that are the same but for the rounding of the loads that they are made of.
+SAME_UNIT = 1 + 1e-6
 STATIC = (
     Column("slip_share", "1", "share of the pairs that slip"),
     Column("open_share", "1", "share of the pairs that are open"),
@@ -60,6 +63,7 @@ def _wear(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     return {
         "amplitude": float(table["amplitude"][-1]),
         "last_cycles": float(table["cycles"][-1]),
+        "cycle_unit": float(attributes["cycle_unit"]),
         "worn_volume": float(sum(values[-1] for values in worn)),
         "new_zeta": float(zeta[0]),
         "largest_zeta": float(zeta[most_damped(zeta)]),
@@ -74,6 +78,17 @@ def _wear_words(row: Row) -> str:
     return (
         f"a = {row['amplitude']:.4g} {row['unit']}: zeta {new:.4g} % when new, largest {top:.4g} %, {last:.4g} % after"
         f" {row['last_cycles']:.4g} cycles, {row['last_frequency_hz']:.6g} Hz"
+    )
+
+
+def _wear_note(rows: Sequence[Row]) -> str:
+    """Where what is compared has not worn for equally many vibrations."""
+    units = [row.get("cycle_unit", math.nan) for row in rows]  # older results do not have it
+    if not units or not max(units) > SAME_UNIT * min(units):
+        return ""
+    return (
+        f"a normalised cycle is {min(units):.4g} to {max(units):.4g} vibrations, by the value: wear is not compared"
+        " after equally many vibrations unless `cycle_unit` is given"
     )
 
 
@@ -171,7 +186,9 @@ def _known(row: Row, begin: str) -> list[float]:
     return [row[key] for key in row if key.startswith(begin) and math.isfinite(row[key])]
 
 
-WEAR_LINES = Summary(WEAR, _wear, _wear_words, "line", spread=("last_zeta", "last_frequency_hz", "worn_volume"))
+WEAR_LINES = Summary(
+    WEAR, _wear, _wear_words, "line", spread=("last_zeta", "last_frequency_hz", "worn_volume"), note=_wear_note
+)
 STATES_AT_REST = Summary(
     STATIC, _static, _static_words, "factor", spread=("slip_share", "open_share", "smallest_normal_force")
 )

@@ -102,6 +102,8 @@ class Summary:
     cut_off : tuple of str
         Columns that a value lacks where they would be large: quantiles of the others would be too small, and are made
         where all have them alone.
+    note : callable
+        What is to be known of all rows beside their words; empty where there is nothing.
     """
 
     columns: tuple[Column, ...] = ()
@@ -112,6 +114,7 @@ class Summary:
     spread: tuple[str, ...] = ()
     numbered: tuple[Column, ...] = ()
     cut_off: tuple[str, ...] = ()
+    note: Callable[[Sequence[Row]], str] = lambda rows: ""
 
 
 COUNTS = Summary()
@@ -269,6 +272,23 @@ def _largest_blade(table: Table, attributes: Table) -> dict[str, float]:
     return {column.name: float(peak[key]) for column, key in zip(WHEEL_FORCED, own)}
 
 
+def in_words(name: str, plan: Plan, rows: Sequence[Row], kind: str, columns: Sequence[Column], unit: str) -> list[str]:
+    """A sweep's summary for the terminal: a line for each row, of draws the quantiles, and what is to be known of all.
+
+    Parameters
+    ----------
+    columns : of the summary
+    unit : of the amplitudes
+    """
+    of = summary_of(kind)
+    if over_seeds(plan):
+        told = quantile_lines(name, plan, rows, spread_of(kind, columns), of.split)
+    else:
+        told = landmarks(name, plan, rows, of, unit)
+    note = of.note(rows)
+    return [*told, f"{name}: {note}"] if note else told
+
+
 def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary, unit: str) -> list[str]:
     """A line for each row of a sweep's summary, for the terminal; `unit` of the amplitudes."""
     labels = plan.labels()
@@ -295,10 +315,8 @@ def read_landmarks(name: str, group: h5py.Group) -> list[str]:
         row = {key: float(values.reshape(len(plan), -1)[number, k]) for key, values in data.items()}
         if not math.isnan(row["points"]):
             rows.append({"value": number, **part, **row})
-    if not over_seeds(plan):
-        return landmarks(name, plan, rows, of, unit_of_amplitudes(group))
     columns = [replace(c, unit=summary[c.name].attrs["units"]) for c in columns_in(kind, rows)]
-    return quantile_lines(name, plan, rows, spread_of(kind, columns), of.split)
+    return in_words(name, plan, rows, kind, columns, unit_of_amplitudes(group))
 
 
 def _part(row: Row, of: Summary) -> str:

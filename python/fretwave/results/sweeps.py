@@ -33,8 +33,8 @@ from ..texts import toml
 from ..units import ATTRIBUTE, SI, UnitSystem, units_of
 from .file import ENDED
 from .results import has_results, open_results, rewritten
-from .sweep_quantiles import over_seeds, quantile_lines, quantile_rows
-from .sweep_summary import COMMON, columns_in, landmarks, split_of, spread_of, summarise, summary_of
+from .sweep_quantiles import over_seeds, quantile_rows
+from .sweep_summary import COMMON, columns_in, in_words, split_of, summarise, summary_of
 
 if TYPE_CHECKING:
     import h5py
@@ -203,10 +203,8 @@ def summary_lines(name: str, plan: Plan, branches: Sequence[Branch], rows: Seque
     if not branches:
         return [f"{name}: nothing was found with any of the values"]
     kind = str(branches[0].attributes["type"])
-    if not over_seeds(plan):
-        return landmarks(name, plan, rows, summary_of(kind), amplitude_unit(branches))
-    columns = spread_of(kind, summary_columns(kind, branches, rows))
-    return quantile_lines(name, plan, rows, columns, split_of(kind))
+    columns = summary_columns(kind, branches, rows)
+    return in_words(name, plan, rows, kind, columns, amplitude_unit(branches))
 
 
 def key_values(values: Sequence[Any]) -> Any:
