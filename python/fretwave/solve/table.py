@@ -119,7 +119,7 @@ class Table:
 
 
 #: Columns worth a line of text.
-_SHORT = ("place", "point", "level", "amplitude", "omega", "frequency_hz", "zeta", "phase", "slip", "event")
+_SHORT = ("place", "point", "level", "amplitude", "cycles", "omega", "frequency_hz", "zeta", "phase", "slip", "event")
 
 
 def _cell(value: Value) -> str:
