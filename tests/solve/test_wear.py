@@ -187,6 +187,26 @@ def test_reports_are_numbers_of_cycles(comm, reports):
         fw.Wear(mode, y, 1.0, None, reports)
 
 
+@pytest.mark.parametrize(
+    "going",
+    [{"depth": [0.1, 0.2]}, {"depth": [-0.1]}, {"depth": [np.nan]}, {"at": -1.0}, {"at": np.nan}]
+    + [{name: value} for name in ("step", "load_scale") for value in (0.0, -1.0, np.nan)],
+    ids=lambda going: f"{next(iter(going))} {np.size(next(iter(going.values())))}",
+)
+def test_a_march_goes_on_from_numbers(comm, going):
+    """A step below zero ended it where it began; depths of more pairs were taken, with rates of fewer."""
+    mode, y = node(comm)
+    with pytest.raises(fw.InputError, match=next(iter(going))):
+        fw.Wear(mode, y, 1.0, **going)
+
+
+def test_depths_are_those_of_the_pairs(comm):
+    mode, y = node(comm)
+    for depth in (np.zeros(2), np.zeros(0), np.zeros((1, 1))):
+        with pytest.raises(fw.InputError, match="depths are not those of the pairs"):
+            mode.solve(depth, y)
+
+
 def test_what_ends_before_a_report_says_so(comm):
     mode, y = node(comm)
     march = fw.Wear(mode, y, 1e5, fw.WearControl(tolerance=1e-2), [0.0, 1.0, 9e4, 2e5])

@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..arrays import Array
-from ..given import numbers, positive
+from ..given import not_negative, numbers, positive
 from ..kinds import of_their_kinds
 from .steppers import STEPPERS, StageDiverged, StageFailed, take
 from .steps import TOO_FAST, TOO_MANY, WearControl
@@ -87,16 +87,18 @@ class Wear:
         self.mode, self.control, self.cycles = mode, control or WearControl(), positive("cycles", cycles)
         self.tableau = STEPPERS[self.control.stepper]
         self.asked = numbers("report_at", list(report_at), (len(report_at),), least=0.0)
+        self.eta, self.reason, self.converged = not_negative("at", at), "", False
         self.reports = sorted({*(value for value in report_at if value > at), cycles})
         self.points = points
-        self.eta, self.reason, self.converged = at, "", False
-        start = np.zeros(len(mode.areas)) if depth is None else np.asarray(depth, dtype=float)
+        pairs = mode.areas.shape
+        start = np.zeros(pairs) if depth is None else numbers("depth", depth, pairs, least=0.0)
         mode.wear(start)
         self.state = mode.measure(y.copy(), start, outcome)
         closed = self.state.load[self.state.load > 0]
-        self.load_scale = load_scale or (float(closed.mean()) if len(closed) else 1.0)
+        own = float(closed.mean()) if len(closed) else 1.0
+        self.load_scale = own if load_scale is None else positive("load_scale", load_scale)
         self.depth_scale = self.load_scale / mode.stiffness
-        self.step = step or self.control.first or self._first_step()
+        self.step = (self.control.first or self._first_step()) if step is None else positive("step", step)
         self._spent = [0, 0]
         #: Of each pair's rate over the last step, as exponents by cycle; not known before one.
         self.growth = np.full(len(mode.areas), np.inf) if growth is None else np.asarray(growth, dtype=float)

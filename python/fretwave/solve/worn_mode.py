@@ -121,6 +121,9 @@ class WornMode(Destroyable):
 
     def wear(self, depth: Array) -> None:
         """The contacts have these depths (n_pairs,) from now on."""
+        if np.shape(depth) != self.areas.shape:
+            fix = "give a depth for each pair of the contacts that wear"
+            raise InputError("depths are not those of the pairs", "depth", np.shape(depth), self.areas.shape, fix)
         self.problem.core.wear(self._local(depth))
 
     def measure(self, y: PETSc.Vec, depth: Array, outcome: tuple[int, int, float] = (0, 0, 0.0)) -> WornState:
