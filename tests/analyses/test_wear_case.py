@@ -224,6 +224,14 @@ def test_bad_input_is_refused(folder: Path, tmp_path: Path, old: str, new: str, 
         load_case(tmp_path / "case.toml")
 
 
+def test_wear_of_odd_harmonics_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "model.py").write_text(BUILDER.read_text())
+    text = (TEXT + WEAR).replace('type = "mode"', 'type = "mode"\nretain = "odd"', 1)
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(CaseErrors, match="odd harmonics alone"):
+        load_case(tmp_path / "case.toml")
+
+
 @pytest.mark.parametrize(
     "settings",
     [

@@ -207,6 +207,16 @@ def test_depths_are_those_of_the_pairs(comm):
             mode.solve(depth, y)
 
 
+@pytest.mark.parametrize("orders", [[1], [1, 3]], ids=["one", "odd"])
+def test_wear_needs_the_mean(comm, orders):
+    """Without it mean loads, and what is made of them, were the cosine of the lowest harmonic."""
+    side = {"normal_stiffness": 1.0, "tangential_stiffness": 1.0, "friction_coefficient": B, "normal_load": P0}
+    model = fw.Model(np.eye(2), np.eye(2), None, [fw.Contact("coulomb_2d", np.eye(2), side)], comm)
+    problem = fw.NonlinearMode(model, fw.Harmonics(orders, 16), "CNM", 1, fw.linear_modes(model, 1, "stuck")[0])
+    with pytest.raises(fw.InputError, match="mean, which is not retained"):
+        fw.WornMode(problem, C, {"contact": np.ones(1)})
+
+
 def test_what_ends_before_a_report_says_so(comm):
     mode, y = node(comm)
     march = fw.Wear(mode, y, 1e5, fw.WearControl(tolerance=1e-2), [0.0, 1.0, 9e4, 2e5])

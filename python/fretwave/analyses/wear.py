@@ -115,7 +115,7 @@ class WearAnalysis(AnalysisSection):
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
         check_once(report, "amplitude", self.amplitude)
         check_displaced(report, "mode", self.mode, facts)
-        self._check_wave(report, facts)
+        self._check_motion(report, facts)
         by_accuracy = {str(entry.get("name")) for entry in facts.source.entries("analysis") if "accuracy" in entry}
         if self.harmonics is None and self.mode in by_accuracy:
             expected, fix = "a set for all cycles: the mode chooses its own", "add for example `harmonics = 7`"
@@ -127,13 +127,16 @@ class WearAnalysis(AnalysisSection):
         if facts.model_known and facts.complete:
             self._check_contacts(report, facts)
 
-    def _check_wave(self, report: Reporter, facts: Facts) -> None:
-        """One sector is marched for all: they wear alike in a travelling wave alone."""
+    def _check_motion(self, report: Reporter, facts: Facts) -> None:
+        """One sector is marched for all: they wear alike in a travelling wave alone. Worn depth moves the mean."""
         mode = next((entry for entry in facts.source.entries("analysis") if entry.get("name") == self.mode), {})
         if mode.get("wheel") and (mode.get("mistuning") is not None or mode.get("wave") == "standing"):
             fix = "add a mode of one sector with its nodal_diameter, and name that"
             what = "moves the sectors of a wheel differently, which is not marched"
             report.wrong(("mode",), what, "a travelling wave of equal sectors, which wear alike", fix)
+        if mode.get("retain") == "odd":
+            fix = f"give '{self.mode}' retain = \"all\", or leave retain out"
+            report.wrong(("mode",), "retains odd harmonics alone", "the mean among them, which worn depth moves", fix)
 
     def _check_contacts(self, report: Reporter, facts: Facts) -> None:
         """A contact with a normal direction, and the areas of its pairs."""

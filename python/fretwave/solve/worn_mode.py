@@ -69,7 +69,8 @@ class WornMode(Destroyable):
     Raises
     ------
     InputError
-        There is no such contact, or it cannot wear; the coefficient is below zero, or an area no number above.
+        There is no such contact, or it cannot wear; the coefficient is below zero, or an area no number above; the
+        harmonics have no mean, which worn depth changes.
     """
 
     @of_their_kinds
@@ -81,6 +82,9 @@ class WornMode(Destroyable):
         self.contacts = [k for k, name in enumerate(names) if name in areas]
         if not self.contacts:
             raise InputError("no contact wears", "areas", "none", f"areas of {', '.join(names)}", "name one that wears")
+        if (lowest := problem.harmonics.orders[0]) != 0:
+            what, measured = "worn depth moves the mean, which is not retained", f"lowest harmonic {lowest}"
+            raise InputError(what, None, measured, "harmonic 0 retained", 'retain all harmonics (retain = "all")')
         sizes = [self.model.contacts[k].n_pairs for k in self.contacts]
         each = [numbers(f"areas['{names[k]}']", areas[names[k]], (n,), above=0.0) for k, n in zip(self.contacts, sizes)]
         self.areas = np.concatenate(each)
