@@ -122,6 +122,19 @@ def test_stop_rules(comm):
     assert len(list(march)) == 1 and march.eta == 0 and "stopped" in march.reason
 
 
+def test_a_lost_contact_has_no_cycle_of_its_own(comm):
+    """In closed form load is left at any cycle: each tolerance loses the last of it at another one, and it is said."""
+    ends = []
+    for tolerance in (1e-2, 1e-4):
+        mode, y = node(comm)
+        march = fw.Wear(mode, y, 1e5, fw.WearControl(tolerance=tolerance))
+        *_, last = march
+        assert last.state.load[0] == 0 and 0 < worn_load(march.eta) < 10 * tolerance * P0
+        assert "contact lost" in march.reason and "depends on the tolerance" in march.reason
+        ends.append(march.eta)
+    assert ends[1] > 1.5 * ends[0]
+
+
 def test_a_march_that_has_stopped_goes_no_further_when_it_is_gone_on_with(comm):
     mode, y = node(comm)
     march = fw.Wear(mode, y, 2.1e3, fw.WearControl(tolerance=1e-3))

@@ -28,6 +28,8 @@ LEFT = 1e-10
 LAST_TRY = 1e-2
 #: A step grows and shrinks by no more than this, and aims at this share of what is allowed.
 GROWTH, SHRINKING, SAFETY = 3.0, 0.1, 0.85
+#: A pair wears as it is loaded: its load fades like e^-t, and what a step is off by takes the last of it.
+LOST = "contact lost: all pairs are open, at a cycle that depends on the tolerance where loads fade"
 #: Lengths that a step may have in every factor of two.
 GRID = 16
 
@@ -155,7 +157,7 @@ class Wear:
         if remaining <= 0:
             self.reason = "cycles done"
         elif (self.state.load <= 0).all():
-            self.reason = "contact lost: all pairs are open"
+            self.reason = LOST
         elif (left <= self.control.tolerance * self.depth_scale).all():
             self.reason = "wear has stopped: to the last cycle it changes nothing beyond the tolerance"
         self.converged = bool(self.reason)
