@@ -122,6 +122,8 @@ def worn() -> fw.Branch:
         *({name: value} for name in ("cycles", "cycle_unit") for value in (0.0, -1.0, NAN)),
         *({"coefficient": value} for value in (-1.0, NAN)),
         *({"areas": areas} for areas in ({}, *({"contact": a} for a in ([0.0], [-1.0], [1.0, 1.0], 1.0, [NAN])))),
+        *({"areas": areas} for areas in (None, "contact", 1.0)),
+        *({"report_at": reports} for reports in (0.5, None, "soon")),
         {"amplitude": NAN},
     ],
     ids=str,
@@ -130,6 +132,17 @@ def test_wear_has_positive_numbers(changed: dict[str, Any], worn: fw.Branch) -> 
     """Negative ones ended "wear has stopped", as asked; two areas made two pairs of one, areas of zero no end."""
     options = {"amplitude": 0.1, "coefficient": 1e-3, "areas": {"contact": [1.0]}, "cycles": 1.0, **changed}
     assert next(iter(changed)) in refused(lambda: fw.wear(worn, **options))
+
+
+def test_wear_is_that_of_a_mode(worn: fw.Branch) -> None:
+    """Of a forced response it found the frequency's motion and looked for a mode's columns in it."""
+    problem = worn.problem
+    assert isinstance(problem, fw.NonlinearMode)
+    force, rest = {1: np.array([0.0, 0.1])}, fw.balanced(problem.model)
+    forced = fw.ForcedResponse(problem.model, problem.harmonics, force, 1.0, 1, problem.start, rest=rest)
+    response = fw.follow(forced, 0.5, 0.6)
+    assert "not that of a mode" in refused(lambda: fw.wear(response, 0.1, 1e-3, {"contact": [1.0]}, 1.0))
+    assert "another kind" in refused(lambda: fw.WornMode(forced, 1e-3, {"contact": [1.0]}))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,7 @@ TAKES: dict[str, Callable[[Any], object]] = {
     "static_preload(model": lambda it: fw.static_preload(it, np.zeros(1)),
     "balanced(model": lambda it: fw.balanced(it),
     "wear(branch": lambda it: fw.wear(it, 0.1, 1e-9, {}, 10.0),
+    "WornMode(problem": lambda it: fw.WornMode(it, 1e-9, {}),
     "standing_wave(mode": lambda it: fw.standing_wave(it, 1, 4, 0),
     "travelling_wave(mode": lambda it: fw.travelling_wave(it, 1, 4),
     "on_pair_coordinates(structure": lambda it: fw.on_pair_coordinates(it),

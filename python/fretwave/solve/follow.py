@@ -108,7 +108,7 @@ def follow(
     first = problem.parameter(start) if own else float(numbers("start", start))
     y0: PETSc.Vec = start if own else problem.initial(first)
     low, high, upwards = _range(first, stop)
-    reports = _reports(report_at)
+    reports = reports_of(report_at)
     settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": reports, "upwards": upwards}
     if accuracy is None:
         continuation = Continuation(problem, y0, **settings)
@@ -201,7 +201,7 @@ def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, floa
     return low, high, None
 
 
-def _reports(given: Sequence[float]) -> list[float]:
+def reports_of(given: Sequence[float]) -> list[float]:
     """Parameter values, as numbers."""
     values = array_of(given)
     if values.ndim != 1 or values.dtype.kind not in "biuf" or not np.isfinite(values).all():

@@ -11,8 +11,10 @@ from ..arrays import Array
 from ..columns import MODAL, Column, columns_named
 from ..errors import InputError
 from ..given import positive
+from ..hb.nonlinear_mode import NonlinearMode
 from ..kinds import of_their_kinds
 from .branch import Branch
+from .follow import reports_of
 from .steps import WearControl
 from .table import Table
 from .wear import Wear, WearPoint
@@ -120,19 +122,23 @@ def wear(
     Raises
     ------
     InputError
-        The branch does not pass the amplitude, a contact cannot wear, a number is not above zero, or the cycles are no
-        number of vibrations.
+        The branch is of no mode or does not pass the amplitude, a contact cannot wear, a number is not above zero, or
+        the cycles are no number of vibrations.
     StageFailed
         Newton does not find the start.
     """
-    places = branch.at(amplitude=amplitude)
+    problem = branch.problem
+    if not isinstance(problem, NonlinearMode):
+        what, fix = "the branch is not that of a mode", "follow a fw.NonlinearMode for it"
+        raise InputError(what, "wear(branch=...)", repr(problem), "a NonlinearMode", fix)
+    reports, places = reports_of(report_at), branch.at(amplitude=amplitude)
     if not len(places):
         length = branch.units["amplitude"]
         span = f"{branch['amplitude'].min():g} to {branch['amplitude'].max():g} {length}"
         measured = f"{amplitude:g} {length}"
         raise InputError("the branch does not pass this amplitude", None, measured, span, "take one within")
     first, guess = branch.unknowns(0), branch.unknowns(float(places["place"][0]))
-    problem, rows, states = branch.problem, [], []
+    rows, states = [], []
     with WornMode(problem, coefficient, areas) as mode:
         unworn = np.zeros(len(mode.areas))
         given = None if cycle_unit is None else positive("cycle_unit", cycle_unit)
@@ -141,7 +147,7 @@ def wear(
         for vector in (first, guess):
             vector.destroy()
         outcome = (new.newton, new.linear, new.residual)
-        march = Wear(mode, new.y, unit * cycles, control, [unit * value for value in report_at], outcome=outcome)
+        march = Wear(mode, new.y, unit * cycles, control, [unit * value for value in reports], outcome=outcome)
         new.y.destroy()
         for point in march:
             rows.append(problem.model.comm.bcast(wear_row(mode, point, unit, errors)))

@@ -12,7 +12,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from ..given import not_negative, numbers
-from ..hb.harmonic_problem import HarmonicProblem
+from ..hb.nonlinear_mode import NonlinearMode
 from ..kinds import of_their_kinds
 from ..model.law_info import Role
 from ..model.laws import law_like
@@ -74,9 +74,12 @@ class WornMode(Destroyable):
     """
 
     @of_their_kinds
-    def __init__(self, problem: HarmonicProblem, coefficient: float, areas: Mapping[str, Array]) -> None:
+    def __init__(self, problem: NonlinearMode, coefficient: float, areas: Mapping[str, Array]) -> None:
         self.problem, self.model, self.coefficient = problem, problem.model, not_negative("coefficient", coefficient)
         names = [contact.name for contact in self.model.contacts]
+        if not isinstance(areas, Mapping):
+            fix = f"give {{{names[0] if names else 'contact'!r}: [...]}}"
+            raise InputError("areas are not given by contact", "areas", repr(areas), "a dict of them by name", fix)
         for name in areas:
             self._check(name, names)
         self.contacts = [k for k, name in enumerate(names) if name in areas]
