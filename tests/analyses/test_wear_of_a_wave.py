@@ -77,6 +77,19 @@ def test_volumes_are_said_to_be_of_one_sector(wheel: str, tmp_path: Path) -> Non
     assert not wheel or not mode
 
 
+@pytest.mark.parametrize("key", ["wheel = true", ""], ids=["wheel", "sector"])
+def test_errors_without_the_reduction_s_are_told_as_such(key: str, tmp_path: Path, capfd) -> None:
+    """A wheel's mode was told right to 1e-13 % where its sector's, of the same six component modes, is to 0.1 %."""
+    shutil.copy(built_sector.__file__, tmp_path / "model.py")
+    flow = "[aerodynamics]\nfrequency = 2500.0\ndamping = { 1 = -0.02, -1 = 0.01 }\n"
+    text = CASE.replace(flow, "").replace("aerodynamics = true", key)
+    (tmp_path / "case.toml").write_text(text)
+    assert call("run", tmp_path / "case.toml", "--no-plots", "--out", tmp_path / "run") == 0
+    mode, wear = (line for line in capfd.readouterr().out.splitlines() if "error of zeta up to" in line)
+    assert ("without the reduction's, which is not known" in mode) == bool(key)
+    assert "without the reduction's" not in wear
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("wave")

@@ -279,6 +279,6 @@ def summarise(name: str, table: Mapping[str, Any], cycles: Sequence[Mapping[str,
         f" {'largest ' * changes}damping {100 * without_rounding(zeta[top]):.4g} %"
         f" {f'at a = {amplitude[top]:.4g} {unit}' if changes else 'throughout'},"
         f" {counted(folds, 'fold')},"
-        f"{largest_error('zeta', 100 * table['zeta_error'], '%')} {table['wall_s'].sum():.2f} s"
+        f"{largest_error('zeta', table, 'zeta_error', '%', 100)} {table['wall_s'].sum():.2f} s"
     ]
     return lines + [f"{name}: limit cycle at {place(cycle, unit)}: {stability(cycle)}" for cycle in cycles]

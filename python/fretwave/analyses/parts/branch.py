@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
-from ...arrays import Array, Complex
+from ...arrays import Complex
 from ...case.analysis import AnalysisSection
 from ...case.analysis_tables import StepSection
 from ...case.harmonic import HarmonicSection
@@ -69,10 +69,15 @@ def error_text(error: float) -> str:
     return f"{told:<11}" if told else ""
 
 
-def largest_error(what: str, errors: Array, unit: str) -> str:
-    """The same of a branch."""
-    known = errors[np.isfinite(errors)]
-    return f" error of {what} up to {known.max():.2g} {unit}," if len(known) else ""
+def largest_error(what: str, table: Mapping[str, Any], column: str, unit: str, scale: float = 1.0) -> str:
+    """The same of a branch, and whether its reduction's share, nan where it is not known, is not in it."""
+    errors = scale * table[column]
+    known = np.isfinite(errors)
+    if not known.any():
+        return ""
+    shares = [values[known] for name, values in table.items() if name.endswith("_error_reduction")]
+    missing = " without the reduction's, which is not known," if np.isnan(shares).any() else ""
+    return f" error of {what} up to {errors[known].max():.2g} {unit}{missing or ','}"
 
 
 def suspected(branch: Continuation, stiffness: float, units: UnitSystem) -> str:

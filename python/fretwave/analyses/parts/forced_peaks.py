@@ -37,7 +37,7 @@ def write_peaks(
     context.write_table("peaks", peaks, lengths)
     lines = [
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
-        f"{largest_error('the amplitude', table['amplitude_error'], unit)} {table['wall_s'].sum():.2f} s"
+        f"{largest_error('the amplitude', table, 'amplitude_error', unit)} {table['wall_s'].sum():.2f} s"
     ]
     for row, level in enumerate(peaks["level"]):
         peak = {key: float(value[row]) for key, value in peaks.items()}

@@ -240,7 +240,7 @@ def _told(table: dict[str, Any]) -> str:
     if not table:
         return ""
     zeta, top = np.round(100 * table["zeta"], 4) + 0.0, int(np.argmax(table["zeta"]))
-    error = largest_error("zeta", 100 * table["zeta_error"], "%").rstrip(",")
+    error = largest_error("zeta", table, "zeta_error", "%", 100).rstrip(",")
     jumps = sum("jump" in event.split() for event in table["event"])
     return (
         f"; zeta {zeta[0]:.4f} % when new, largest {zeta[top]:.4f} % at {table['cycles'][top]:.3g}, {zeta[-1]:.4f} %"
