@@ -134,6 +134,13 @@ def test_wear_has_positive_numbers(changed: dict[str, Any], worn: fw.Branch) -> 
     assert next(iter(changed)) in refused(lambda: fw.wear(worn, **options))
 
 
+def test_a_march_is_printed_over_its_cycles(worn: fw.Branch) -> None:
+    march = fw.wear(worn, 0.1, 1e-3, {"contact": [1.0]}, 1.0)
+    head, *_, last = march.text().splitlines()
+    place = head.split().index("cycles")
+    assert float(last.split()[place]) == pytest.approx(march["cycles"][-1], rel=1e-5)
+
+
 def test_wear_is_that_of_a_mode(worn: fw.Branch) -> None:
     """Of a forced response it found the frequency's motion and looked for a mode's columns in it."""
     problem = worn.problem
