@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
 
 import fretwave as fw
 
@@ -82,3 +84,28 @@ def test_names_of_files_are_of_any_kind_of_path_and_none_may_be_left_out(tmp_pat
     for near in (0.0, "2", np.inf, {}):
         with pytest.raises(fw.InputError, match="near"):
             fw.linear_modes(model(), near=near)
+
+
+class Model:
+    """Of another package."""
+
+
+@pytest.mark.parametrize(
+    "given",
+    [lambda: fw.linear_modes(Model()), lambda: fw.Model([[1]], [[4]], comm=PETSc.COMM_SELF)]
+    + [lambda: fw.Model([[1]], [[4]], comm=MPI.COMM_NULL), lambda: fw.linear_modes(model(), 1, stable=7)],
+    ids=["a Model of another package", "a communicator of petsc4py", "no communicator", "neither true nor false"],
+)
+def test_a_name_is_not_enough(given: Callable[[], object]) -> None:
+    with pytest.raises(fw.InputError, match="of another kind"):
+        given()
+
+
+def test_what_is_true_may_be_a_number_of_any_kind() -> None:
+    for one in (True, np.True_, 1, np.int64(1)):
+        assert len(fw.linear_modes(model(), 1, stable=one)) == 1
+
+
+def test_python_names_the_function_whose_arguments_are_not_its_own() -> None:
+    with pytest.raises(TypeError, match=r"follow\(\) got an unexpected keyword argument 'foo'"):
+        fw.follow(mode(), 0.1, 0.2, foo=1)

@@ -9,6 +9,8 @@ from functools import wraps
 from inspect import signature
 from typing import Any, TypeVar
 
+import numpy as np
+
 from .errors import InputError
 from .texts import shortened
 
@@ -48,7 +50,11 @@ def of_their_kinds(work: Work) -> Work:
 
     @wraps(work)
     def checked(*args: object, **given: object) -> Any:
-        for name, value in parameters.bind_partial(*args, **given).arguments.items():
+        try:
+            bound = parameters.bind_partial(*args, **given).arguments
+        except TypeError:
+            return work(*args, **given)  # Python's own words, with the name
+        for name, value in bound.items():
             if name in known and not _fits(value, known[name]):
                 expected = " or ".join(sorted(known[name]))
                 measured, where = f"{shortened(repr(value), 60)}, a {type(value).__name__}", f"{place}({name}=...)"
@@ -75,5 +81,12 @@ def _fits(value: object, options: frozenset[str]) -> bool:
         return True
     if "Callable" in options:
         return callable(value)
-    classes = {one.__name__ for one in type(value).__mro__}
-    return bool(classes & options) or ("bool" in options and bool(classes & {"int", "bool_"}))
+    if "bool" in options and isinstance(value, (bool, np.bool_, int, np.integer)):
+        return value in (0, 1)
+    classes = {one.__name__ for one in type(value).__mro__ if one.__module__.partition(".")[0] == _home(one.__name__)}
+    return bool(classes & options) and (bool(value) or not classes & {"Comm"})  # MPI.COMM_NULL is no communicator
+
+
+def _home(name: str) -> str:
+    """The package that a class of this name is of."""
+    return {"Comm": "mpi4py", "Intracomm": "mpi4py", "Vec": "petsc4py", "str": "builtins"}.get(name, "fretwave")

@@ -46,7 +46,10 @@ Diagnosis states(Law const& law, Motion const& motion, double const* f) {
 
 void set_shares(Diagnosis& diagnosis, size_t pair, double contact, double slip) {
   const size_t n = diagnosis.work.size();
-  if (contact == 1 && slip == 0 && diagnosis.shares[n + pair] == 1) return;
+  if (contact == 1 && slip == 0) {
+    if (diagnosis.shares[n + pair] == 1) return;
+    for (size_t row = pair; row < diagnosis.status.size(); row += n) diagnosis.status[row] = Status::stick;
+  }
   const double shares[] = {std::max(0.0, contact - slip), slip, std::max(0.0, 1 - contact)};
   for (size_t state = 0; state < 3; ++state) diagnosis.shares[state * n + pair] = shares[state];
 }

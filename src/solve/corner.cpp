@@ -61,7 +61,7 @@ int sign_of(std::vector<double> dense, int n) {
 
 }  // namespace
 
-/// So that a determinant is had in some 50 ms.
+/// At most 1000 unknowns, whose determinant takes some 50 ms.
 bool Continuation::small(Vec y) { return global_size(y) <= 1000; }
 
 /// Sign of det [J(y); row], 0 if it is singular or too large to tell. Collective.
@@ -125,7 +125,7 @@ bool Continuation::beyond_corner(Trial const& trial) const {
 bool Continuation::leads_back(Trial& trial) {
   if (global_size(trial.y) > quick) return false;
   const double cosine = along_facet(trial.y, trial.tangent, no_force);
-  if (cosine <= -surely_one) return true;  // or it turns on the way: shorter steps tell
+  if (cosine <= -surely_one) return true;  // shorter steps tell a turn on the way from a way back
   if (cosine >= surely_one && !round_facet(anchor_.y, trial.y)) return false;
   trial.sign = determinant(trial.y, weighted(weights_, trial.tangent));
   return trial.sign ? anchor_sign() * trial.sign < 0 : cosine <= -one_facet;

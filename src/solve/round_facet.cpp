@@ -20,7 +20,7 @@ namespace {
 
 constexpr double longest = 1e-4, nearer = 2;              // steps in which such a facet is passed
 constexpr double shallow = 0.01, deep = 100, deeper = 3;  // across, in squares of these
-constexpr int powers = 3;
+constexpr int powers = 3;  // of J^T J, by which its stiffest direction is found
 
 }  // namespace
 
@@ -65,7 +65,9 @@ std::optional<Continuation::Trial> Continuation::turn_round_facet(Vec across, do
   if (!newton_.tangent(across, tangent, true)) return {};
   const double size = weighted_norm(weights_, tangent);
   if (!std::isfinite(size)) return {};
-  check(VecScale(tangent, anchor_sign() * determinant(across, weighted(weights_, tangent)) / size));
+  const int sign = anchor_sign() * determinant(across, weighted(weights_, tangent));
+  if (!sign) return {};
+  check(VecScale(tangent, sign / size));
   finely_ = true;
   auto trial = along_piece(across, tangent, length, length, 0);
   finely_ = false;

@@ -159,5 +159,7 @@ def test_a_pair_that_a_load_brings_to_its_limit_in_an_instant_sticks(comm, law):
         along = [mode for mode in fw.linear_modes(model, n) if abs(mode.shape[tangent]) > 0.9]
         problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), dof=tangent, start=along[0], rest=rest)
         branch = fw.follow(problem, 1e-3, 1e-2, errors=False)
-        shares = problem.contact_history(branch.unknowns(0))[0]["shares"].ravel()
-    assert shares.tolist() == [1, 0, 0] and branch["slip"][0] == 0 and branch["zeta"][0] == 0
+        told = problem.contact_history(branch.unknowns(0))[0]
+        shares, status = told["shares"].ravel(), told["status"]
+    assert shares.tolist() == [1, 0, 0] and not (status == SLIP).any()
+    assert branch["slip"][0] == 0 and branch["zeta"][0] == 0

@@ -78,7 +78,7 @@ def test_a_mode_leads_on_behind_a_facet_that_it_touches(comm, seed):
     assert told(branch) == pytest.approx(told(shortly), rel=1e-9)
 
 
-@pytest.mark.ranks(1)
+@pytest.mark.ranks(1, 2)
 def test_a_response_turns_right_round_where_a_slider_begins_to_be_held(comm):
     """No step was short enough: its extension does not meet the other piece. It ends as one that begins there."""
     problem, *_ = scene(comm, 166)
@@ -88,7 +88,7 @@ def test_a_response_turns_right_round_where_a_slider_begins_to_be_held(comm):
     assert branch["amplitude"][-1] == pytest.approx(end["amplitude"][0], rel=1e-9)
 
 
-@pytest.mark.ranks(1)
+@pytest.mark.ranks(1, 2)
 def test_a_curve_that_touches_such_facets_closes(comm):
     """It ended at the first one in long steps, with a word of a mean position that is free."""
     branch, shortly = followed(comm, 104), followed(comm, 104, initial=0.02, maximum=0.04)

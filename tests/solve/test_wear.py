@@ -209,14 +209,16 @@ def test_reports_are_numbers_of_cycles(comm, reports):
 def test_a_march_goes_on_from_numbers(comm, going):
     """A step below zero ended it where it began; depths of more pairs were taken, with rates of fewer."""
     mode, y = node(comm)
-    with pytest.raises(fw.InputError, match=next(iter(going))):
-        fw.Wear(mode, y, 1.0, **going)
+    before = mode.problem.energy(y)
+    with pytest.raises(fw.InputError, match=rf"where: +{next(iter(going))}\b"):
+        fw.Wear(mode, y, 1.0, **{"depth": [0.2], **going})
+    assert mode.problem.energy(y) == before  # nothing is worn
 
 
 def test_depths_are_those_of_the_pairs(comm):
     mode, y = node(comm)
-    for depth in (np.zeros(2), np.zeros(0), np.zeros((1, 1))):
-        with pytest.raises(fw.InputError, match="depths are not those of the pairs"):
+    for depth in (np.zeros(2), np.zeros(0), np.zeros((1, 1)), np.array([-0.1]), [np.nan], ["a"]):
+        with pytest.raises(fw.InputError, match=r"where: +depth\b"):
             mode.solve(depth, y)
 
 

@@ -98,14 +98,14 @@ def linear_modes(
     if contact not in ("stuck", "free", "linearised"):
         raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
     near = None if near is None else positive("near", near)
-    if near is not None and (contact == "linearised"):
-        given, fix = f"near={near}, contact={contact}", "give stuck or free contact"
-        raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
+    if near is not None and contact == "linearised":
+        given, expected = f"near={near}, contact={contact}", "stuck or free contact"
+        raise InputError("modes near a frequency are those without damping", None, given, expected, "leave near out")
     count = _number(count)
     model.check_unchanged()
     _check_factor(model)
     try:
-        found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near, stable)
+        found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near, bool(stable))
     except InputError as error:  # on all ranks
         raise (NothingMoves(*error.args) if error.what == NOTHING_LEFT else error) from None
     except PetscError as error:

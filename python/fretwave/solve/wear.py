@@ -11,7 +11,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..arrays import Array
-from ..given import not_negative, numbers, positive
+from ..errors import InputError
+from ..given import array_of, not_negative, numbers, positive
 from ..kinds import of_their_kinds
 from .steppers import STEPPERS, StageDiverged, StageFailed, take
 from .steps import TOO_FAST, TOO_MANY, WearControl
@@ -50,6 +51,15 @@ class WearPoint:
         what = f" {self.event}" if self.event else ""
         deepest = float(self.state.depth.max(initial=0.0))
         return f"WearPoint({self.cycles:.6g} cycles{what}: deepest {deepest:.3g}, step error {self.error:.1e})"
+
+
+def _growth(values: object, shape: tuple[int, ...]) -> Array:
+    """Exponents of rates, infinite where none is known."""
+    found = array_of(values)
+    if found.dtype.kind not in "biuf" or found.shape != shape or np.isnan(found).any():
+        wanted = f"{shape} numbers, infinite where none is known"
+        raise InputError("a number cannot be used", "growth", repr(values), wanted, "give such numbers")
+    return found.astype(float)
 
 
 class Wear:
@@ -94,16 +104,18 @@ class Wear:
         self.points = points
         pairs = mode.areas.shape
         start = np.zeros(pairs) if depth is None else numbers("depth", depth, pairs, least=0.0)
+        given = None if load_scale is None else positive("load_scale", load_scale)
+        first = self.control.first if step is None else positive("step", step)
+        #: Of each pair's rate over the last step, as exponents by cycle; not known before one.
+        self.growth = np.full(pairs, np.inf) if growth is None else _growth(growth, pairs)
         mode.wear(start)
         self.state = mode.measure(y.copy(), start, outcome)
         closed = self.state.load[self.state.load > 0]
         own = float(closed.mean()) if len(closed) else 1.0
-        self.load_scale = own if load_scale is None else positive("load_scale", load_scale)
+        self.load_scale = own if given is None else given
         self.depth_scale = self.load_scale / mode.stiffness
-        self.step = (self.control.first or self._first_step()) if step is None else positive("step", step)
+        self.step = first or self._first_step()
         self._spent = [0, 0]
-        #: Of each pair's rate over the last step, as exponents by cycle; not known before one.
-        self.growth = np.full(len(mode.areas), np.inf) if growth is None else np.asarray(growth, dtype=float)
 
     def __repr__(self) -> str:
         return f"Wear({self.eta:g} of {self.cycles:g} cycles: {self.reason or 'under way'}, of {self.mode})"

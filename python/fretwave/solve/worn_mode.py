@@ -128,10 +128,7 @@ class WornMode(Destroyable):
 
     def wear(self, depth: Array) -> None:
         """The contacts have these depths (n_pairs,) from now on."""
-        if np.shape(depth) != self.areas.shape:
-            fix = "give a depth for each pair of the contacts that wear"
-            raise InputError("depths are not those of the pairs", "depth", np.shape(depth), self.areas.shape, fix)
-        self.problem.core.wear(self._local(depth))
+        self.problem.core.wear(self._local(numbers("depth", depth, self.areas.shape, least=0.0)))
 
     def measure(self, y: PETSc.Vec, depth: Array, outcome: tuple[int, int, float] = (0, 0, 0.0)) -> WornState:
         """Rates and loads of a converged motion at these depths."""
