@@ -14,7 +14,6 @@ const Tuned kink_length("branch_kink_length", 1e-4,
 const Tuned crawl("branch_crawl", 300, "steps below the smallest in a row, over pieces that thin");
 const Tuned often("branch_often", 0.3, "share of a step: a shorter one has failed twice");
 const Tuned before_end("branch_before_end", 0.999, "share of the way to the end of a piece");
-const Tuned kink_angle("branch_kink_angle", 0.02, "turn [rad] that is a kink in so short a step");
 const Tuned seen_angle("branch_seen_angle", 0.05,
                        "turn [rad] at a corner, below which pieces are no longer walked one by one");
 const Tuned unturned("branch_unturned", 0.01,
@@ -142,18 +141,7 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
     return "the branch bends more than a step resolves";
   if (may_shorten)
     return leads_back(trial) || fell_back(trial) ? "the corrector lands on another branch" : "";
-  const bool round = round_facet(anchor_.y, trial.y);
-  if (angle < kink_angle && !round) return "";
-  const int sign = beyond_corner(trial) && !round ? 1 : orientation(trial.y, trial.tangent);
-  if (sign < 0 && round && (angle < kink_angle || just_touched()))
-    return "the corrector lands on another branch";
-  if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
-  if (sign < 0) {
-    check(VecScale(trial.tangent, -1));
-    trial.tests = tests(trial.y, trial.tangent);
-  }
-  turned_ = angle > steps_.max_angle;
-  return "";
+  return oriented(trial, angle);
 }
 
 /// The corner at the end of the present piece, if that is no farther than a kink. Else `length` is shortened
@@ -217,7 +205,8 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
 
 /// One accepted step from the anchor; halves the length on failure or when the branch bends too much. After a
 /// failure in front of a corner, with none nearer by far, pieces are walked one by one until one is passed
-/// without a turn. Where that ends, steps of all lengths are tried beyond the corners ahead.
+/// without a turn. Where that ends, steps of all lengths are tried beyond the corners ahead, and then, of at
+/// most 1000 unknowns, the other side of a facet that the branch touches.
 std::optional<Continuation::Trial> Continuation::step(double& length, double& next_length) {
   Failure failure;
   double soft = INFINITY;  // an end of the present piece that is no corner

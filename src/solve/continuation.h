@@ -142,6 +142,7 @@ class Continuation {
   int orientation(Vec y, Vec tangent, double cosine);
   bool beyond_corner(Trial const&) const;
   bool leads_back(Trial&);
+  std::string oriented(Trial&, double angle);
   std::uint64_t piece(Vec y) { return problem_.piece(y, finely_); }
   bool on_piece(std::uint64_t here, double at);
   bool corner_within(double reach, double& soft);

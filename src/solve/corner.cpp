@@ -31,6 +31,7 @@ constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the 
 constexpr double no_force = 1e-3;        // of a tangent on the other piece, in forces that act
 constexpr int halvings = 60;
 
+const Tuned kink_angle("branch_kink_angle", 0.02, "turn [rad] that is a kink in so short a step");
 const Tuned quick("branch_quick", 500,
                   "unknowns, at most 1000, up to which each step asks a determinant which way it leads");
 const Tuned surely_in("branch_surely_in", 100,
@@ -129,6 +130,23 @@ bool Continuation::leads_back(Trial& trial) {
   if (cosine >= surely_one && !round_facet(anchor_.y, trial.y)) return false;
   trial.sign = determinant(trial.y, weighted(weights_, trial.tangent));
   return trial.sign ? anchor_sign() * trial.sign < 0 : cosine <= -one_facet;
+}
+
+/// Turns the tangent of a trial behind a step so short that a turn is a corner, to lead on; what speaks
+/// against it. Sheets that touch a facet lie so near to each other that Newton finds either. Collective.
+std::string Continuation::oriented(Trial& trial, double angle) {
+  const bool touched = round_facet(anchor_.y, trial.y);
+  if (angle < kink_angle && !touched) return "";
+  const int sign = beyond_corner(trial) && !touched ? 1 : orientation(trial.y, trial.tangent);
+  if (sign < 0 && touched && (angle < kink_angle || just_touched()))
+    return "the corrector lands on another branch";
+  if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
+  if (sign < 0) {
+    check(VecScale(trial.tangent, -1));
+    trial.tests = tests(trial.y, trial.tangent);
+  }
+  turned_ = angle > steps_.max_angle;
+  return "";
 }
 
 /// Whether the tangent lies on this piece at a distance from the anchor. Collective.
