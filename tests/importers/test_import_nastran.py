@@ -113,6 +113,13 @@ def test_grid_points(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_node_file(tmp_path / "main.dat").numbers, [1, 2, 3])
 
 
+@pytest.mark.parametrize("said", ["INCLUDE'model.bdf'", 'include,"model.bdf"'], ids=["quote", "comma"])
+def test_a_deck_that_only_includes_others_is_known(tmp_path: Path, said: str) -> None:
+    deck(tmp_path)
+    (tmp_path / "main.dat").write_text(f"{said}\n")
+    np.testing.assert_array_equal(read_node_file(tmp_path / "main.dat").numbers, [1, 2, 3])
+
+
 def test_grid_points_of_real_decks() -> None:
     """One turns the displacements of a grid point; the other joins some by an RBE2."""
     with pytest.raises(InputError, match=r"(?s)directions of nodes are turned.*CD of GRID 11"):

@@ -35,11 +35,15 @@ FORMS = {
     "no quotes": "INCLUDE one.bdf",
     "double quotes, behind blanks": '  include "one.bdf"',
     "quotes over two lines": "INCLUDE 'one.\n         bdf'",
+    "a dollar in quotes": "INCLUDE 'o$e.bdf' $ one",
+    "a dollar without quotes": "INCLUDE one.bdf$ one",
+    "marks of another card used again": "GRID,1,,4.,5.,6.,,,+A\nPLOTEL,1,1,2,,,,,+B\n+B,3",
 }
 
 
 def read(folder: Path, cards: str, head: str = "SOL 103\nCEND\nMPC = 3\nBEGIN BULK\n") -> nastran.Nodes:
-    (folder / "one.bdf").write_text("GRID,1,,4.,5.,6.\n")
+    for name in ("one.bdf", "o$e.bdf"):
+        (folder / name).write_text("GRID,1,,4.,5.,6.\n")
     path = folder / "model.bdf"
     path.write_bytes(f"{head}{cards}\nGRID,2,,1.,2.,3.\nENDDATA\n".encode("latin1"))
     return nastran.read_grid(path)
@@ -60,6 +64,16 @@ REFUSED = {
     "own order": ("GRID,1,,4.,5.,6.\nSEQGP,1,2,2,1", "an order of their own"),
     "two models": ("GRID,1,,4.,5.,6.\nBEGIN SUPER=1", "several models"),
     "lines apart": ("GRID*,1,,4.0,5.0,*A\n*B,6.0", "go on with the card before"),
+    "another card between": ("GRID*,1,,4.,5.,*A\nPLOTEL,1,1,2\n*A,6.", "stand behind the card"),
+    "a card of its kind between": ("GRID*,1,,4.,5.,*A\nGRID,3\n*A,,,6.", "stand behind the card"),
+    "the next line first": ("*A,6.\nGRID*,1,,4.,5.,*A\nPLOTEL,1,1,2", "stand behind the card"),
+    "a line before any card": ("+,6.\nGRID,1,,4.,5.,6.", "stand behind the card"),
+    "behind another card at the end": ("GRID*,1,,4.,5.,*A\nPLOTEL,1,1,2,,,,,+B\n*A,6.", "stand behind the card"),
+    "an open quote": ("INCLUDE 'one.bdf\n" + 9 * "PLOTEL,1,1,2\n", "not closed"),
+    "an open quote at the end of a file": ("INCLUDE 'one.bdf", "not closed"),
+    "a point of a fluid": ("GRID,1,,4.,5.,6.,-1", "of a fluid"),
+    "directions in no system": ("GRID,1,,4.,5.,6.,7", "directions of nodes are turned"),
+    "directions by a word": ("GRID,1,,4.,5.,6.,x7", "no number"),
     "a field too many": ("GRID,1,,4.0,5.0,\n,6.0", "no number"),
     "a file that is not there": ("INCLUDE 'two.bdf'", "does not exist"),
     "a circle of files": ("INCLUDE 'model.bdf'", "includes itself"),

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -69,14 +70,10 @@ def read_grid(path: Path) -> Nodes:
     _check_cards(grid, where, "ENDDATA" in deck.getvalue())
     _check_systems(grid, bulk.rdcards(deck, BY_POINTS, regex=True, return_var="list", no_data_return=[]), where)
     _check_order(deck.getvalue(), where)
+    _check_turned(grid, bulk.rdcards(deck, "GRDSET") is not None, where)
     table = bulk.bulk2uset(deck)[0]
     places = table[["x", "y", "z"]].to_numpy(dtype=float).reshape(-1, 6, 3)  # behind x, y, z: system, origin, turn
     numbers = table.index.get_level_values(0).to_numpy(dtype=np.int64)[::6]
-    turned = numbers[places[:, 1, 0] != 0]
-    if len(turned) or bulk.rdcards(deck, "GRDSET") is not None:
-        measured = f"CD of GRID {turned[0]}, {len(turned)} such" if len(turned) else "GRDSET"
-        fix = "leave CD and GRDSET out and write the matrices again"
-        raise InputError("directions of nodes are turned", where, measured, "directions x, y, z at every node", fix)
     cards = bulk.rdcards(deck, JOINS, regex=True, return_var="list", keep_name=True, no_data_return=[])
     joins = Constraints(joins=str(cards[0][0]) if cards else "")
     return Nodes(numbers, places[:, 0], where, constraints=joins)
@@ -86,7 +83,7 @@ def _check_cards(cards: Sequence[Sequence[object]], where: str, ends: bool) -> N
     """Fields that are no numbers would be read as zero; what is blank is (Quick Reference Guide, GRID)."""
     expected = "GRID, number, system, x, y, z"
     for card in cards:
-        wrong = [field for field in card[:5] if isinstance(field, str) and field] or card[8:]
+        wrong = [field for field in card[:6] if isinstance(field, str) and field] or card[8:]
         if wrong:
             measured = f"{wrong[0]} in GRID {card[0]}"
             raise InputError(
@@ -95,6 +92,19 @@ def _check_cards(cards: Sequence[Sequence[object]], where: str, ends: bool) -> N
     if cards and len(cards[-1]) < 5 and not ends:
         measured, fix = f"GRID {cards[-1][0]} ends behind {len(cards[-1])} fields, no ENDDATA", "write the deck again"
         raise InputError("the deck is cut within a grid point", where, measured, expected, fix)
+
+
+def _check_turned(grid: Sequence[Sequence[Any]], defaults: bool, where: str) -> None:
+    """Before systems are looked for: CD -1 is none, but says that the point is a fluid's (GRID)."""
+    turned = sorted(card[0] for card in grid if len(card) > 5 and card[5])
+    fluid = sorted(card[0] for card in grid if len(card) > 5 and card[5] == -1)
+    if fluid:
+        measured, expected = f"CD -1 of GRID {fluid[0]}, {len(fluid)} such", "points of a structure"
+        raise InputError("grid points are of a fluid", where, measured, expected, "give the structure's deck alone")
+    if turned or defaults:
+        measured = f"CD of GRID {turned[0]}, {len(turned)} such" if turned else "GRDSET"
+        fix = "leave CD and GRDSET out and write the matrices again"
+        raise InputError("directions of nodes are turned", where, measured, "directions x, y, z at every node", fix)
 
 
 def _check_order(deck: str, where: str) -> None:

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 from ..errors import InputError
-from ..texts import display
+from ..texts import display, shortened
 
 #: Data fields of a line by their width.
 FIELDS = {8: 8, 16: 4}
+#: Lines over which the quoted name of a file may go.
+QUOTED = 8
 _INCLUDE = re.compile(r"\s*INCLUDE[\s,]*([\"']?)(.*)", re.IGNORECASE | re.DOTALL)
 
 
@@ -25,28 +28,36 @@ def flat(path: Path, wanted: re.Pattern[str]) -> str:
     Raises
     ------
     InputError
-        A card is a copy of another or has a wrong name, there are several models, or an included file is not there.
+        A card is a copy of another or has a wrong name, a line goes on elsewhere, there are several models, or an
+        included file is not there.
     """
     cards: list[list[str]] = []
     odd: list[tuple[str, str]] = []
-    going_on, marked = False, ""
+    going_on, marked = None, ""  # None: there is no card yet
+    astray: list[tuple[str, str, str]] = []
+    ends = {""}
     for place, line in _lines(path, path.parent, ()):
         name, fields, mark = _fields(line)
         if name.startswith("BEGIN"):
             _check_one_model(place, line)
-            cards, odd, going_on = [], [], False
+            cards, odd, astray, ends, going_on = [], [], [], {""}, None
         elif name == "ENDDATA":
             cards.append([name])
             break
         elif name[:1] not in ("", "+", "*"):
+            ends |= {_bare(marked)} if going_on else set()
             known = wanted.match(name)
             going_on = known is not None and name[known.end() :].strip() in ("", "*")
             cards += [[known[0], *fields]] if known and going_on else []
             odd += [(place, line)] if name.startswith("=") or (known and not going_on and "=" not in line) else []
-        elif going_on:
-            _check_mark(place, line, marked, name)
-            cards[-1] += fields
+        else:
+            if going_on is None or _bare(name) not in ("", _bare(marked)):
+                astray.append((place, line, "" if going_on is None else _bare(name)))
+            if going_on:
+                _check_mark(place, line, marked, name)
+                cards[-1] += fields
         marked = mark
+    _check_astray(astray, ends | ({_bare(marked)} if going_on else set()))
     for place, line in odd[:1]:
         expected, fix = "a name and fields of 8 or 16 columns, or with commas", "write each card out"
         raise InputError("a card is a copy of another, or has a wrong name", place, line.strip(), expected, fix)
@@ -58,16 +69,25 @@ def _lines(path: Path, root: Path, above: tuple[Path, ...]) -> Iterator[tuple[st
     lines = iter(enumerate(path.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1))
     for count, given in lines:
         line, place = given.partition("$")[0].expandtabs(), f"{display(path)}:{count}"
-        found = _INCLUDE.match(line)
+        found = _INCLUDE.match(given)
         if found is None:
             if line.strip():
                 yield place, line
             continue
-        quote, name = found[1], found[2]
-        while quote and quote not in name and (more := next(lines, None)):
-            name = name.rstrip() + more[1].strip()
-        name = name.partition(quote)[0] if quote else name.strip()
+        name = _quoted(found[2], found[1], lines, place) if found[1] else found[2].partition("$")[0].strip()
         yield from _lines(_included(name, path, root, (*above, path.resolve()), place), root, (*above, path.resolve()))
+
+
+def _quoted(text: str, quote: str, lines: Iterator[tuple[int, str]], place: str) -> str:
+    """Up to the closing quote, on the next lines too; a dollar in it begins no comment."""
+    for _, more in islice(lines, QUOTED - 1) if quote not in text else ():
+        text = text.rstrip() + more.strip()
+        if quote in text:
+            break
+    if quote not in text:
+        what, expected = "the quote of an included file is not closed", f"a {quote} within {QUOTED} lines"
+        raise InputError(what, place, shortened(text), expected, "close the quote behind the name")
+    return text.partition(quote)[0]
 
 
 def _included(name: str, path: Path, root: Path, above: tuple[Path, ...], place: str) -> Path:
@@ -106,10 +126,22 @@ def _check_one_model(place: str, line: str) -> None:
 
 def _check_mark(place: str, line: str, marked: str, name: str) -> None:
     """Lines that go on somewhere else are not looked for."""
-    before, now = (word.lstrip("+*").strip().upper() for word in (marked, name))
+    before, now = _bare(marked), _bare(name)
     if before and now and before != now:
         what, fix = "a line does not go on with the card before", "put it behind its card"
         raise InputError(what, place, line.strip(), f"a line that begins with {marked}", fix)
+
+
+def _check_astray(astray: list[tuple[str, str, str]], ends: set[str]) -> None:
+    """Lines that go on with no line before them, but with a card that is read by the mark at its end, or with none."""
+    for place, line, mark in astray:
+        if mark in ends:
+            what, expected = "a line does not stand behind the card that it goes on with", "its card on the line before"
+            raise InputError(what, place, line.strip(), expected, "put it behind its card")
+
+
+def _bare(mark: str) -> str:
+    return mark.lstrip("+*").strip().upper()
 
 
 def _text(cards: list[list[str]]) -> str:

@@ -17,7 +17,7 @@ KINDS = (
     (re.compile(b"\\A" + re.escape(head_of(12))), ansys_mesh.__name__, "read_result"),
     (re.compile(rb"^NBLOCK,", re.MULTILINE | re.IGNORECASE), ansys_mesh.__name__, "read_archive"),
     (
-        re.compile(rb"^[ \t]*(GRID(\*?[ \t]+|\*?[ \t]*,[ \t]*)\d|INCLUDE[ \t])", re.MULTILINE | re.IGNORECASE),
+        re.compile(rb"^[ \t]*(GRID(\*?[ \t]+|\*?[ \t]*,[ \t]*)\d|INCLUDE[ \t,'\"])", re.MULTILINE | re.IGNORECASE),
         nastran.__name__,
         "read_grid",
     ),
