@@ -50,3 +50,13 @@ def test_damping_that_the_solver_left_to_itself_does_not_vary(left: float, expec
     table = {"zeta": zeta, "omega0": np.full(20, 50.0), "lambda_error_solver": np.full(20, 50.0 * left)}
     assert varies(table) is expected
     assert not varies(table, slice(3, 4)) and varies({**table, "zeta": zeta + 1e-9 * np.arange(20)})
+
+
+@pytest.mark.parametrize(("well_known", "expected"), [(3, True), (1, False)], ids=["mixed", "one"])
+def test_a_point_that_is_badly_known_says_nothing_of_the_others(well_known: int, expected: bool) -> None:
+    """Damping varies where two points differ by more than the solver left of these two."""
+    left = np.where(np.arange(5) < well_known, 1e-8, 1.0)
+    table = {"zeta": 0.01 * np.arange(1, 6), "omega0": np.full(5, 50.0), "lambda_error_solver": 50.0 * left}
+    assert varies(table) is expected
+    table["zeta"][0] = np.nan
+    assert varies(table) is expected

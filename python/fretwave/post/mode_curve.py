@@ -33,12 +33,15 @@ def most_damped(zeta: Array) -> int:
 
 
 def varies(table: Mapping[str, Any], rows: Indices | slice = slice(None)) -> bool:
-    """Damping changes along some rows of a branch by more than rounding, and than its solver left of it."""
-    zeta, left = np.asarray(table["zeta"])[rows], np.zeros(1)
+    """Damping changes along some rows of a branch by more than rounding, and than its solver left at each of them."""
+    zeta = np.asarray(table["zeta"])[rows]
+    left = np.zeros(len(zeta))
     if "lambda_error_solver" in table and "omega0" in table:
         left = (np.asarray(table["lambda_error_solver"]) / np.asarray(table["omega0"]))[rows]
-    known, bound = zeta[np.isfinite(zeta)], float(left.max(where=np.isfinite(left), initial=0.0))
-    return most_damped(zeta) != most_damped(-zeta) and bool(np.ptp(known) > 2.0 * bound)
+    known, left = np.isfinite(zeta), np.where(np.isnan(left), 0.0, left)
+    least = (zeta - left).max(where=known, initial=-np.inf)
+    most = (zeta + left).min(where=known, initial=np.inf)
+    return most_damped(zeta) != most_damped(-zeta) and bool(least > most)
 
 
 def without_rounding(zeta: float) -> float:
