@@ -37,9 +37,15 @@ AT_START = re.compile(
 )
 
 
-def choosing(pairs: Sequence[tuple[str, str | None]], prefix: str) -> dict[str, str | None]:
-    """Those of an analysis' own options that choose its solvers, without its prefix."""
-    plain = {name.removeprefix(prefix): value for name, value in pairs}
+def choosing(
+    wide: Sequence[tuple[str, str | None]], own: Sequence[tuple[str, str | None]], prefix: str, known: Sequence[str]
+) -> dict[str, str | None]:
+    """Options of an analysis that choose its solvers, without its prefix: the run's that are its alone, then its own.
+
+    Of the prefixes of all analyses (`known`) one may begin with another.
+    """
+    mine = [pair for pair in wide if owner(pair[0], known) == prefix]
+    plain = {name.removeprefix(prefix): value for name, value in [*mine, *own]}
     return {name: value for name, value in plain.items() if name in ("route", "blocks") or name.endswith("_type")}
 
 
@@ -123,11 +129,9 @@ class RunWide:
         return self._of_like_ones(prefix, plain) or any(its in others and r.match(plain) for its, r in READ_BY.items())
 
     def _of_like_ones(self, prefix: str, plain: str) -> bool:
-        """Analyses of its kind before it have seen to it, or one after it that has other solvers will."""
+        """Analyses of its kind before it have seen to it, or one after it that has solvers of its own will."""
         like = [other for other, its in self.kinds.items() if its == self.kinds.get(prefix)]
         place = like.index(prefix) if prefix in like else 0
-        before, after = (
-            [self.own.get(other) == self.own.get(prefix) for other in part]
-            for part in (like[:place], like[place + 1 :])
-        )
-        return any(before) or not all(after) or (place > 0 and plain in self.read)
+        solvers = [self.own.get(other) for other in like]
+        later = any(one not in solvers[: place + 1] for one in solvers[place + 1 :])
+        return self.own.get(prefix) in solvers[:place] or later or (place > 0 and plain in self.read)

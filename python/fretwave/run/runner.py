@@ -171,9 +171,8 @@ class Runner:
 
     def _choosing(self, analysis: AnalysisSection) -> dict[str, str | None]:
         """Options of an analysis alone that choose its solvers."""
-        prefix = prefix_of(analysis.name)
-        wide = [pair for pair in parse(self.options.petsc) if pair[0].startswith(prefix)]
-        return choosing([*wide, *parse(analysis.petsc)], prefix)
+        known = [prefix_of(name) for name in self.case.analyses]
+        return choosing(parse(self.options.petsc), parse(analysis.petsc), prefix_of(analysis.name), known)
 
     def _run_all(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
         for number, name in enumerate(names, 1):
