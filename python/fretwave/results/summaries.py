@@ -63,7 +63,7 @@ def _wear(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     return {
         "amplitude": float(table["amplitude"][-1]),
         "last_cycles": float(table["cycles"][-1]),
-        "cycle_unit": float(attributes["cycle_unit"]),
+        "cycle_unit": float(attributes.get("cycle_unit", math.nan)),
         "worn_volume": float(sum(values[-1] for values in worn)),
         "new_zeta": float(zeta[0]),
         "largest_zeta": float(zeta[most_damped(zeta)]),
@@ -83,7 +83,7 @@ def _wear_words(row: Row) -> str:
 
 def _wear_note(rows: Sequence[Row]) -> str:
     """Where what is compared has not worn for equally many vibrations."""
-    units = [row.get("cycle_unit", math.nan) for row in rows]  # older results do not have it
+    units = [unit for row in rows if math.isfinite(unit := row.get("cycle_unit", math.nan))]  # not of older results
     if not units or not max(units) > SAME_UNIT * min(units):
         return ""
     return (
