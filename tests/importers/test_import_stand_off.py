@@ -121,4 +121,19 @@ def test_what_a_deck_says_of_the_distance(tmp_path):
     assert not read_stand_off(tmp_path / "none.inp")
     deck.write_text(deck.read_text().replace("ADJUST=Near", "ADJUST=Nearest"))
     with pytest.raises(fw.InputError, match="(?s)no node set 'Nearest'.*fix:"):
-        read_stand_off(deck)
+        of_sides(read_stand_off(deck), ("A", "B")).of(mesh, pairs)
+
+
+@pytest.mark.parametrize("other", ["\n*TRANSFORM, NSET=ALL\n1, 0, 0, 0, 1, 0", ""], ids=["turned", "no_set"])
+def test_sets_are_looked_for_in_the_contact_that_is_asked_for_alone(other, tmp_path):
+    """What the deck's other contacts need is not read, nor what a clearance replaces."""
+    deck = tmp_path / "static.inp"
+    deck.write_text(
+        f"*NODE\n1, 0, 0, 0{other}\n*CONTACT PAIR, INTERACTION=DRY, ADJUST=NEAR\nA, B\nG, H\n"
+        "*CONTACT PAIR, INTERACTION=DRY, ADJUST=0.5\nC, D\n*CLEARANCE, SLAVE=G, MASTER=H, VALUE=0.25\n"
+    )
+    known, mesh, pairs = read_stand_off(deck), np.array([0.4, 0.6]), np.array([[1, 2], [3, 4]])
+    assert of_sides(known, ("C", "D")).of(mesh, pairs).tolist() == [0.0, 0.6]
+    assert of_sides(known, ("G", "H")).of(mesh, pairs).tolist() == [0.25, 0.25]
+    with pytest.raises(fw.InputError, match="fix:"):
+        of_sides(known, ("A", "B")).of(mesh, pairs)

@@ -34,7 +34,7 @@ class StandOff:
     Attributes
     ----------
     adjusted : what is as far apart begins at zero [length]
-    nodes : those of the dependent surface that begin at zero however far they are
+    node_set : deck, set and dependent surface, whose nodes in both begin at zero however far they are
     value : in place of the mesh's distance [length]
     of_nodes : the dependent surface is one of nodes (``*SURFACE, TYPE=NODE``)
     at_nodes : the contact is from node to surface
@@ -44,14 +44,27 @@ class StandOff:
     value: Optional[float] = None
     of_nodes: bool = False
     at_nodes: bool = False
-    nodes: frozenset[int] = frozenset()
+    node_set: Optional[tuple[Path, str, str]] = None
 
     def of(self, clearance: Array, nodes: IntArray) -> Array:
-        """The distances (n,) with which the step begins, from those of the mesh [length]; nodes (n, 2) of the pairs."""
+        """The distances (n,) with which the step begins, from those of the mesh [length]; nodes (n, 2) of the pairs.
+
+        Raises
+        ------
+        InputError
+            There is no such node set, or the deck's nodes cannot be read.
+        """
         if self.value is not None:
             return np.full(len(clearance), self.value)
-        moved = (clearance <= self.adjusted) | np.isin(nodes, list(self.nodes)).any(axis=1)
+        moved = (clearance <= self.adjusted) | np.isin(nodes, self._of_set()).any(axis=1)
         return np.where(moved, 0.0, clearance)
+
+    def _of_set(self) -> list[int]:
+        """Read for the contact that is asked for alone: others of the deck need not be readable."""
+        if self.node_set is None:
+            return []
+        deck, node_set, dependent = self.node_set
+        return _in_both(read_nodes(deck), node_set, dependent)
 
 
 def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
@@ -80,8 +93,7 @@ def _stand_off(
     try:
         return StandOff(number(adjust) if adjust else -np.inf, value, of_nodes, at_nodes)
     except ValueError:
-        nodes = frozenset(_in_both(read_nodes(deck), adjust, dependent))
-        return StandOff(-np.inf, value, of_nodes, at_nodes, nodes)
+        return StandOff(-np.inf, value, of_nodes, at_nodes, (deck, adjust, dependent))
 
 
 def _in_both(mesh: Nodes, node_set: str, surface: str) -> list[int]:
