@@ -9,6 +9,7 @@ import pytest
 from tolerances import SOLVED
 
 import fretwave as fw
+from fretwave.case.load import load_case
 from fretwave.commands.main import main
 
 pytestmark = pytest.mark.ranks(1)
@@ -70,3 +71,16 @@ def test_an_interference_without_preload(tmp_path: Path, capfd, text: str, balan
         given = f"[preload]\nbalanced = {word}\n{text}"
         assert pressed(tmp_path, given) == pytest.approx((force, force), rel=SOLVED)
         assert "note: contact" not in capfd.readouterr().out
+
+
+def test_contacts_without_memory_are_balanced_beside_one_that_presses(tmp_path: Path, capfd) -> None:
+    """The structure stays where it is; alone they move it, and no [preload] is advised: time integration has none."""
+    (text, _), (other, _) = LAWS.values()
+    contact = other[other.index("[[contact]]") : other.index("[[analysis]]")].replace('"pad"', '"stop"')
+    mixed = text.replace("[[analysis]]", f"{contact}[[analysis]]", 1)
+    assert pressed(tmp_path, mixed) == pytest.approx((-KN * GAP,) * 2, rel=SOLVED)
+    said = capfd.readouterr().out
+    for name in ("pad", "stop"):
+        assert f"'{name}': its gap (an interference) is taken as balanced" in said
+    (tmp_path / "case.toml").write_text(other)
+    assert "[preload], which" not in " ".join(load_case(tmp_path / "case.toml").notes)

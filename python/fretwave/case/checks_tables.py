@@ -85,7 +85,8 @@ def check_preload(source: Source, section: PreloadSection | None, loads: Sequenc
 def implied_preload(source: Source, contacts: Sequence[Contact], notes: list[str]) -> PreloadSection | None:
     """Of a case without [preload]: pairs that press by themselves are in balance as they are, which is noted.
 
-    Only of laws with a memory; others may be integrated in time, which knows no preload: they move the structure.
+    Where a law with a memory presses, then of all contacts; others alone may be integrated in time, which knows no
+    preload: they move the structure.
     """
     pressing = {} if "preload" in source.data else {c.name: told for c in contacts if (told := _pressing(c))}
     kept = [c.name for c in contacts if c.info.memory and c.name in pressing]
@@ -95,7 +96,7 @@ def implied_preload(source: Source, contacts: Sequence[Contact], notes: list[str
             said += " is taken as balanced, for there is no [preload]; `[preload] balanced = false` lets it move the"
             notes.append(f"{said} structure")
         elif role is Role.GAP:
-            notes.append(f"{said} moves the structure, for there is no [preload], which takes it as balanced")
+            notes.append(f"{said} moves the structure, for there is no [preload]")
     return PreloadSection() if kept else None
 
 
