@@ -43,7 +43,16 @@ def test_units_are_those_of_the_model_file(tmp_path: Path, told: str | None) -> 
     assert f"[{'N/mm' if told else 'N/m'}]" in _line("normal_stiffness", tmp_path / "case.toml")
 
 
-@pytest.mark.parametrize("model", ['builder = "blade.py"', 'file = "missing.h5"'], ids=["builder", "missing"])
+#: Models whose units are not known.
+UNKNOWN = {
+    "builder": 'builder = "blade.py"',
+    "missing": 'file = "missing.h5"',
+    "no such units": 'units = "mm"',
+    "units that are no text": "units = 1",
+}
+
+
+@pytest.mark.parametrize("model", UNKNOWN.values(), ids=UNKNOWN)
 def test_units_that_are_not_known_are_quantities(tmp_path: Path, model: str) -> None:
     (tmp_path / "case.toml").write_text(f"[model]\n{model}\n")
     assert "[force/length]" in _line("normal_stiffness", tmp_path / "case.toml")

@@ -99,10 +99,12 @@ def schema_text(case: Path | None = None) -> str:
 
 
 def _symbols(source: Source) -> Callable[[str], str]:
-    """The units that the case or its model file declares; quantities where only its builder knows, or no file is."""
+    """The units that the case or its model file declares; quantities where they are not known."""
     model = source.data.get("model")
     model = model if isinstance(model, dict) else {}
-    if "units" in model or not {"file", "builder"} & set(model):
+    if "units" in model:
+        return SYSTEMS.get(str(model["units"]), str)
+    if not {"file", "builder"} & set(model):
         return source.units
     try:
         return SYSTEMS.get(read_sources(source.path.parent / str(model["file"]))[0], SI)
