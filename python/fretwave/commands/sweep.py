@@ -14,7 +14,6 @@ from ..files.csv_table import write_rows
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
-from ..mpi.petsc_options import said_unread
 from ..post.grid import Plan
 from ..results.file import OVERRIDES
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, results_folder
@@ -108,9 +107,8 @@ def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console,
     errors = sweep.run(comm, folder.record["run_id"])
     memory = peak_memory_mb(comm)
     outcomes, lines = on_first_rank(comm, lambda: _write(sweep, first, folder, errors))
-    names, of_analyses = on_first_rank(comm, lambda: sweep.unread(folder.record["run_id"]))
-    said = said_unread(names)
-    for line in [*lines, *of_analyses, *([f"note: {said}"] if said else [])]:
+    _, of_options = on_first_rank(comm, lambda: sweep.unread(folder.record["run_id"], lead="note: "))
+    for line in [*lines, *of_options]:
         console.line(line)
     bad = why_stopped(outcomes)
     status = {"status": "stopped" if bad else "done", "wall_s": round(time.perf_counter() - began, 3)}

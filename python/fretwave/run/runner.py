@@ -353,10 +353,10 @@ class Runner:
         self._start()
         outcome = run_sweep(sweep, name, self.comm, self.console, self.folder, self.case.title)
         self._note(name, outcome, time.perf_counter() - began)
-        names, lines = on_first_rank(self.comm, lambda: sweep.unread(self.folder.record["run_id"]))
+        run_id, elsewhere = self.folder.record["run_id"], dict(self.wide.pairs)
+        names, lines = on_first_rank(self.comm, lambda: sweep.unread(run_id, elsewhere))
         self._unread_in_sweeps.append(names)
-        own = [one for one in names if one not in dict(self.wide.pairs)]
-        for line in [*lines, *filter(None, [said_unread(own)])]:
+        for line in lines:
             self.console.line(f"{name}: {line}")
 
     def _note(self, name: str, outcome: Outcome, seconds: float, entry: Mapping[str, Any] | None = None) -> None:

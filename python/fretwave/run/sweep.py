@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from ..console import Estimate, Shown
 from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
+from ..mpi.petsc_options import said_unread
 from ..mpi.petsc_share import UNREAD
 from ..post.grid import Plan
 from ..results.runfolder import RECORD, new_record, read_record
@@ -143,14 +144,21 @@ class Sweep:
             found.append({"over": values, "folder": place, "status": status, "reason": reason, **times})
         return found
 
-    def unread(self, run_id: str) -> tuple[list[str], list[str]]:
-        """PETSc options that no value's solvers have read, and what is said of single analyses. One rank only."""
+    def unread(self, run_id: str, elsewhere: Container[str] = (), lead: str = "") -> tuple[list[str], list[str]]:
+        """PETSc options that no value's solvers have read, and lines on them. One rank only.
+
+        Parameters
+        ----------
+        elsewhere : options that are told of in another place
+        lead : begins the line on options of no single analysis
+        """
         records = [self._record(number, run_id) for number in range(len(self.plan))]
         told = [record[UNREAD] for record in records if record is not None and UNREAD in record]
         if not told or any(record is not None and UNREAD not in record for record in records):
             return [], []  # of a value that was gone on with it is not known
         names, lines = ([one for one in told[0][key] if all(one in own[key] for own in told)] for key in told[0])
-        return names, lines
+        said = said_unread([name for name in names if name not in elsewhere])
+        return names, [*lines, *([lead + said] if said else [])]
 
     def forget_others(self) -> None:
         """Remove runs of values of an earlier sweep that had more of them. One rank only."""
