@@ -249,6 +249,12 @@ double Continuation::next_step(Trial const& trial, double length, double intende
                                                      most * intended)));
 }
 
+/// Whether a place lies at an end of the range, or beyond.
+bool Continuation::outside(Vec y) const {
+  const double at = last_entry(y);
+  return at <= problem_.parameter_entry(low_) || at >= problem_.parameter_entry(high_);
+}
+
 /// The branch has left its range at this end.
 void Continuation::arrive(double reached) {
   const double goal = upwards_ ? high_ : low_;
@@ -288,10 +294,8 @@ void Continuation::make_batch(double tried) {
             .wary = wary_,
             .smooth = foretold(end->y, length),
             .sign = end->sign};
-  const double reached = last_entry(end->y);
-  const bool outside =
-      reached <= problem_.parameter_entry(low_) || reached >= problem_.parameter_entry(high_);
-  if (!outside) emit(std::move(*end), length, std::move(events));
+  const bool gone = outside(end->y);
+  if (!gone) emit(std::move(*end), length, std::move(events));
   std::stable_sort(batch_.begin(), batch_.end(),
                    [](auto const& x, auto const& y) { return x.first < y.first; });
   const auto stop = std::find_if(batch_.begin(), batch_.end(), [](auto const& x) {
@@ -302,7 +306,7 @@ void Continuation::make_batch(double tried) {
     if (stop->second.event == reported_stop) stop->second.event = "report";
     batch_.erase(stop + 1, batch_.end());
     arrive(std::abs(value - low_) < std::abs(value - high_) ? low_ : high_);
-  } else if (outside) {
+  } else if (gone) {
     // a long step's interpolation is too far from the branch; how long a corner's is does not depend on this
     if (length / 2 >= steps_.minimum && length <= shorter * tried) {
       clock_ -= stepped;

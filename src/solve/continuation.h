@@ -117,6 +117,7 @@ class Continuation {
   void finish(std::string reason, bool converged);
   Point point(Trial&&, std::string event, double step);
   void make_batch(double tried = INFINITY);
+  bool outside(Vec y) const;
   void arrive(double reached);
 
   // What cubics through its points foretell (interpolation.cpp)

@@ -76,7 +76,7 @@ std::optional<Continuation::Trial> Continuation::turn_round_facet(Vec across, do
 }
 
 /// The same where no step leads on: by tangents from as far across as the branch is there, some square of the
-/// length. Collective.
+/// length. Not over an end of the range, which may lie just before the facet. Collective.
 std::optional<Continuation::Trial> Continuation::behind_touched_facet(double& length) {
   if (!anchor_sign() || just_touched()) return {};
   const VecHandle across = stiffest();
@@ -86,7 +86,8 @@ std::optional<Continuation::Trial> Continuation::behind_touched_facet(double& le
       for (const double side : {1.0, -1.0}) {
         const VecHandle there = moved(anchor_.y, side * way * length * length, across);
         if (problem_.piece(there, true) == here) continue;
-        if (auto trial = turn_round_facet(there, length)) return turned(std::move(trial), length);
+        auto trial = turn_round_facet(there, length);
+        if (trial && !outside(trial->y)) return turned(std::move(trial), length);
       }
   return {};
 }

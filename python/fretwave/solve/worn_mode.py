@@ -128,7 +128,7 @@ class WornMode(Destroyable):
 
     def wear(self, depth: Array) -> None:
         """The contacts have these depths (n_pairs,) from now on."""
-        self.problem.core.wear(self._local(numbers("depth", depth, self.areas.shape, least=0.0)))
+        self.problem.core.wear(self._local(numbers("depth", depth, self.areas.shape)))
 
     def measure(self, y: PETSc.Vec, depth: Array, outcome: tuple[int, int, float] = (0, 0, 0.0)) -> WornState:
         """Rates and loads of a converged motion at these depths."""
