@@ -153,6 +153,7 @@ class Continuation {
   double within_piece(Vec y, Vec tangent, double reach);
   int into_piece(Vec y, Vec tangent, double reach);
   std::optional<Trial> turn_corner(double beyond, double reach, bool seen);
+  std::optional<VecHandle> tangent_at(Vec y);
   std::optional<Trial> along_piece(Vec y, Vec tangent, double reach, double aside, double least);
 
   // Where it touches a facet (round_facet.cpp)

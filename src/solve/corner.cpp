@@ -223,12 +223,9 @@ int Continuation::into_piece(Vec y, Vec tangent, double reach) {
 std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, double reach, bool seen) {
   if (seen) beyond += std::min(at_once, about * reach);
   const VecHandle there = moved(anchor_.y, beyond, anchor_.tangent);
-  VecHandle tangent = copy(anchor_.tangent);
-  newton_.system().close(row_, 0);
-  if (!newton_.tangent(there, tangent, true)) return {};
-  const double size = weighted_norm(weights_, tangent);
-  if (!std::isfinite(size)) return {};
-  check(VecScale(tangent, 1 / size));
+  const auto found = tangent_at(there);
+  if (!found) return {};
+  Vec tangent = *found;
   const bool straight = dot(row_, tangent) > 1 - no_corner && fits(there);
   if (straight && on_piece(piece(anchor_.y), beyond)) return {};
   const double cosine = straight ? 1 : along_facet(there, tangent);
@@ -241,6 +238,18 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   auto trial = along_piece(there, tangent, reach, beyond, std::cos(steps_.max_angle));
   if (trial && !placed && orientation(trial->y, trial->tangent) < 0) return {};
   return trial;
+}
+
+/// The unit tangent of the piece that y lies on, which need not be a solution, along the anchor's.
+/// Collective.
+std::optional<VecHandle> Continuation::tangent_at(Vec y) {
+  VecHandle tangent = copy(anchor_.tangent);
+  newton_.system().close(row_, 0);
+  if (!newton_.tangent(y, tangent, true)) return {};
+  const double size = weighted_norm(weights_, tangent);
+  if (!std::isfinite(size)) return {};
+  check(VecScale(tangent, 1 / size));
+  return tangent;
 }
 
 /// A solution along the tangent of the piece that y lies on, which is off the branch by `aside`.

@@ -1,5 +1,4 @@
-#include <algorithm>
-#include <cmath>
+#include <optional>
 #include <utility>
 
 #include "solve/continuation.h"
@@ -60,16 +59,13 @@ bool Continuation::just_touched() { return before_.y && round_facet(before_.y, a
 
 /// The branch behind such a facet, by a tangent across it. Collective.
 std::optional<Continuation::Trial> Continuation::turn_round_facet(Vec across, double length) {
-  VecHandle tangent = copy(anchor_.tangent);
-  newton_.system().close(row_, 0);
-  if (!newton_.tangent(across, tangent, true)) return {};
-  const double size = weighted_norm(weights_, tangent);
-  if (!std::isfinite(size)) return {};
-  const int sign = anchor_sign() * determinant(across, weighted(weights_, tangent));
+  const auto tangent = tangent_at(across);
+  if (!tangent) return {};
+  const int sign = anchor_sign() * determinant(across, weighted(weights_, *tangent));
   if (!sign) return {};
-  check(VecScale(tangent, sign / size));
+  check(VecScale(*tangent, sign));
   finely_ = true;
-  auto trial = along_piece(across, tangent, length, length, 0);
+  auto trial = along_piece(across, *tangent, length, length, 0);
   finely_ = false;
   if (!trial || !round_facet(anchor_.y, trial->y) || orientation(trial->y, trial->tangent) <= 0) return {};
   return trial;
