@@ -109,3 +109,11 @@ def test_what_is_true_may_be_a_number_of_any_kind() -> None:
 def test_python_names_the_function_whose_arguments_are_not_its_own() -> None:
     with pytest.raises(TypeError, match=r"follow\(\) got an unexpected keyword argument 'foo'"):
         fw.follow(mode(), 0.1, 0.2, foo=1)
+
+
+def test_harmonics_are_taken_from_any_collection() -> None:
+    """An array without dimensions says that it can be gone through, and cannot."""
+    for orders in ([1, 3], (1, 3), {1, 3}, range(1, 4, 2), np.array([1, 3]), (n for n in (1, 3))):
+        assert fw.Harmonics(orders, 64).orders == (1, 3)
+    with pytest.raises(fw.InputError, match="no list"):
+        fw.Harmonics(np.array(3), 64)

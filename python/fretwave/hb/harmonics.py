@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
 
-import numpy as np
-
 from .. import _core
 from ..errors import InputError
 from ..given import whole
@@ -26,7 +24,7 @@ class Harmonics:
     """
 
     def __init__(self, orders: Sequence[int], samples: int) -> None:
-        if not isinstance(orders, Iterable) or isinstance(orders, (str, bytes)) or np.ndim(orders) == 0:
+        if not isinstance(orders, Iterable) or isinstance(orders, (str, bytes)) or not getattr(orders, "ndim", 1):
             fix = "give for example [0, 1, 2, 3]"
             raise InputError("the retained harmonics are no list", "orders", repr(orders), "whole numbers", fix)
         orders, samples = [_whole("orders", n) for n in orders], _whole("samples", samples)
