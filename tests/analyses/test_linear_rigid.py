@@ -32,6 +32,15 @@ def test_what_rounding_leaves_of_a_loose_body_is_zero(seed: int, unit: float) ->
     assert [mode.omega for mode in found] == pytest.approx([0.0, 0.0, 0.0, *np.sqrt(sorted(springs))], rel=1e-9, abs=0)
 
 
+@pytest.mark.parametrize("heavy", [1e-3, 1.0, 1e3, 1e6])
+def test_a_mass_without_a_spring_beside_a_far_lighter_body(heavy: float) -> None:
+    """Its eigenvalue, of no rounding of its own, became a shift next to zero: "-10" of MUMPS."""
+    M, K = np.diag([7e-7, 9e-7, heavy]), 290.0 * np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    exact = np.sqrt(290.0 * (1 / 7e-7 + 1 / 9e-7))
+    found = without_rounding(linear_modes(Model(M, K), 3, "free"), K)
+    assert [mode.omega for mode in found] == pytest.approx([0, 0, exact], rel=1e-9)
+
+
 @pytest.mark.parametrize("soft", [1e-9, 1e-3, 1.0])
 def test_a_soft_spring_keeps_its_frequency(soft: float) -> None:
     """Below eps of the highest omega^2 as well, as far as the modes themselves know it."""
