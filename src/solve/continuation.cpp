@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "tuned.h"
 
@@ -77,9 +78,8 @@ std::string Continuation::adrift(Trial const& trial) {
   return stands.empty() ? problem_.adrift(trial.y, trial.tangent) : stands;
 }
 
-/// Newton on the system closed by row . y = value, then the unit tangent there, oriented along `tangent_row`.
-bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row, Effort effort,
-                           bool exactly) {
+/// Newton on the system closed by row . y = value.
+bool Continuation::find(Trial& trial, Vec row, double value, Effort effort) {
   newton_.system().close(row, value);
   trial.outcome = newton_.solve(trial.y, effort);
   if (!trial.outcome.converged) return false;
@@ -87,25 +87,38 @@ bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row,
     trial.outcome.reason = why;
     return false;
   }
+  return true;
+}
+
+/// The same, then the unit tangent there, oriented along `tangent_row`.
+bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row, Effort effort,
+                           bool exactly) {
+  if (!find(trial, row, value, effort)) return false;
   if (!trial.tangent) trial.tangent = zero_like(trial.y);
   if (tangent_row != row) newton_.system().close(tangent_row, 0);
   if (!newton_.tangent(trial.y, trial.tangent, exactly)) {
     trial.outcome.reason = "the linear solve for the tangent fails";
     return false;
   }
-  VecHandle weights = like(trial.y);
-  problem_.metric(trial.y, weights);
-  const double size = weighted_norm(weights, trial.tangent);
-  if (!std::isfinite(size)) {
+  if (!normalise(trial)) {
     trial.outcome.reason = "the tangent is not finite";
     return false;
   }
-  check(VecScale(trial.tangent, 1 / size));
   if (adrift_ = adrift(trial); !adrift_.empty()) {
     trial.outcome.reason = adrift_;
     return false;
   }
   trial.tests = tests(trial.y, trial.tangent);
+  return true;
+}
+
+/// Its tangent, to length 1 in its own metric.
+bool Continuation::normalise(Trial& trial) {
+  VecHandle weights = like(trial.y);
+  problem_.metric(trial.y, weights);
+  const double size = weighted_norm(weights, trial.tangent);
+  if (!std::isfinite(size)) return false;
+  check(VecScale(trial.tangent, 1 / size));
   return true;
 }
 
@@ -278,6 +291,7 @@ void Continuation::make_batch(double tried) {
   emitted_ = 0;
   double length, next_length;
   auto end = step(length, next_length);
+  const auto remembered = std::tuple(meetings_, circles_, signs_, missed_);
   if (!end || been_here(*end)) return;
   const double stepped = MPI_Wtime() - clock_;  // belongs to the last of the batch, not to an event before it
   clock_ += stepped;
@@ -310,6 +324,8 @@ void Continuation::make_batch(double tried) {
     // a long step's interpolation is too far from the branch; how long a corner's is does not depend on this
     if (length / 2 >= steps_.minimum && length <= shorter * tried) {
       clock_ -= stepped;
+      trail_.forget();
+      std::tie(meetings_, circles_, signs_, missed_) = remembered;
       anchor_.step = length / 2;
       return make_batch(length);
     }

@@ -99,8 +99,10 @@ class Continuation {
 
   // The corrector (continuation.cpp)
   Trial at(VecHandle y) const { return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}}; }
+  bool find(Trial&, Vec row, double value, Effort);
   /// With its tangent, good for a step along it or `exactly` what its test functions need.
   bool correct(Trial&, Vec row, double value, Vec tangent_row, Effort = Effort::full, bool exactly = false);
+  bool normalise(Trial&);
   std::vector<TestFunction> tests(Vec y, Vec tangent);
   std::string adrift(Trial const&);
   void open_the_range();
@@ -175,6 +177,7 @@ class Continuation {
   double zero_on(Hermite const&, size_t which, Place a, Place b);
   double foretold_zero(Hermite const&, size_t which, Bracket const&);
   double beyond(Hermite const& known, size_t which, Place before, Place last, double apart);
+  std::optional<Trial> on(Hermite const&, double at);
   Hermite with(Hermite const&, double at, Vec y, Vec tangent) const;
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
   double passing(std::function<VecHandle(double)> const& guess, double target, Place from, double to);

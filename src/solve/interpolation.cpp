@@ -68,11 +68,12 @@ double Continuation::interpolation_error(Trial const& trial, double length) {
   return strange ? std::max(error, error_in_the_middle(trial, length)) : error;
 }
 
+/// By the branch's point there, of which a few digits are enough.
 double Continuation::error_in_the_middle(Trial const& end, double length) {
   const Hermite curve(anchor_.y, anchor_.tangent, end.y, end.tangent, length, 1 / dot(row_, end.tangent));
   Trial middle = at(curve.value(length / 2));
   const VecHandle expected = copy(middle.y);
-  if (!correct(middle, row_, dot(row_, expected), row_)) return INFINITY;
+  if (!find(middle, row_, dot(row_, expected), Effort::rough)) return INFINITY;
   return distance(middle.y, expected);
 }
 

@@ -38,6 +38,8 @@ const Tuned unrefined(
     "effect by which the first of these is measured: what moves a point far is no refinement");
 const Tuned creeping("newton_creeping", 0.6,
                      "share of the residual that four iterations leave when they creep");
+const Tuned few_digits("newton_few_digits", 1e-4,
+                       "residual over the guess's, where a few digits are asked for");
 const Tuned rescalings("newton_rescalings", 4, "rescalings of the rows as the motion becomes known");
 
 }  // namespace
@@ -65,6 +67,7 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   auto& newton = *static_cast<Newton*>(context);
   const double before = newton.last_[(iteration + newton.last_.size() - 1) % newton.last_.size()];
   newton.step_from_ = iteration == 0 ? residual : before;
+  if (iteration == 0) newton.began_from_ = residual;
   newton.left_.reset();
   if (iteration > 0 && before > 0) newton.left_ = residual / before;
   const bool creeps = newton.creeps(iteration, residual);
@@ -72,6 +75,10 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   if (code || *reason < 0) return code;
   if (iteration == 0) {
     if (*reason > 0 && residual > 0) *reason = SNES_CONVERGED_ITERATING;
+    return code;
+  }
+  if (newton.effort_ == Effort::rough && residual <= few_digits * newton.began_from_) {
+    *reason = SNES_CONVERGED_FNORM_RELATIVE;
     return code;
   }
   Vec y;
@@ -185,13 +192,14 @@ bool Newton::scale(Vec y) {
 Outcome Newton::solve(Vec y, Effort effort) {
   Outcome out;
   effort_ = effort;
+  const bool roughly = effort == Effort::rough;
   scale(y);
   for (int k = 0; k < rescalings; ++k) {
     const Outcome before = std::exchange(out, solve_past_kinks(y));
     out.newton += before.newton, out.linear += before.linear;
-    if (!out.converged || !scale(y)) break;
+    if (!out.converged || roughly || !scale(y)) break;
   }
-  if (out.converged) refine(y, out);
+  if (out.converged && !roughly) refine(y, out);
   return out;
 }
 
@@ -215,6 +223,16 @@ void Newton::refine(Vec y, Outcome& out) {
   }
 }
 
+Outcome Newton::as_it_stands(Vec y) {
+  Outcome out;
+  bordered_.residual(y, right_side_);
+  out.residual = norm(right_side_);
+  out.rounding = std::isfinite(out.residual) ? bordered_.problem().rounding(y) : 0;
+  out.accepted = below_tolerance(out.residual, plain);
+  out.converged = out.accepted || out.residual <= out.rounding;
+  return out;
+}
+
 /// At a kink every shortened step raises the residual until the samples behind it have changed state:
 /// backtracking ends there, a search by the secant of |r|^2 goes through. Tried from the same guess.
 Outcome Newton::solve_past_kinks(Vec y) {
@@ -225,7 +243,8 @@ Outcome Newton::solve_past_kinks(Vec y) {
   Outcome out = solve_persistently(y);
   check(SNESGetLineSearch(snes_, &search));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(search), SNESLINESEARCHBT, &backtracks));
-  if (!past_kinks_ || effort_ != Effort::full || out.converged || out.linear_failure || !backtracks ||
+  const bool persists = effort_ == Effort::full || effort_ == Effort::rough;
+  if (!past_kinks_ || !persists || out.converged || out.linear_failure || !backtracks ||
       !std::isfinite(out.residual))
     return out;
   check(VecCopy(guess, y));

@@ -18,8 +18,8 @@ struct Outcome {
 };
 
 /// What a guess is worth. `brief`: given up once the residual creeps; `plain`: PETSc's iterations; `full`:
-/// those again with the search past kinks.
-enum class Effort { brief, plain, full };
+/// those again with the search past kinks; `rough`: the same, to a few digits of the guess's error.
+enum class Effort { brief, plain, full, rough };
 
 /// SNES on a bordered problem, whose linear systems `LinearSolver` solves.
 class Newton {
@@ -39,6 +39,8 @@ class Newton {
   bool scale(Vec y);
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y, Effort = Effort::full);
+  /// Without a step: converged if there is nothing left that one would take away. Collective.
+  Outcome as_it_stands(Vec y);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
   /// from which the Krylov route starts. Good for a step, or `exactly` for its own values. Collective.
   bool tangent(Vec y, Vec t, bool exactly = false);
@@ -74,7 +76,8 @@ class Newton {
   bool past_kinks_;
   Effort effort_ = Effort::full;
   std::array<double, 4> last_{};  ///< residuals of the last iterations, the k-th at k mod 4
-  double step_from_ = 0;          ///< residual where the last step began
+  double began_from_ = 0;         ///< residual of the guess
+  double step_from_ = 0;          ///< that where the last step began
   std::optional<double> left_;    ///< of it by that step; none where none was taken
 };
 
