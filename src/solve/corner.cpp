@@ -133,13 +133,15 @@ bool Continuation::leads_back(Trial& trial) {
 }
 
 /// Turns the tangent of a trial behind a step so short that a turn is a corner, to lead on; what speaks
-/// against it. Sheets that touch a facet lie so near to each other that Newton finds either. Collective.
+/// against it. Sheets that touch a facet lie so near to each other that Newton finds either, and a turn just
+/// behind the anchor looks like one just ahead: of that the trail tells. Collective.
 std::string Continuation::oriented(Trial& trial, double angle) {
   const bool touched = round_facet(anchor_.y, trial.y);
-  if (angle < kink_angle && !touched) return "";
+  if (angle < kink_angle && !touched && fits(trial.y)) return "";
   const int sign = beyond_corner(trial) && !touched ? 1 : orientation(trial.y, trial.tangent);
   if (sign < 0 && touched && (angle < kink_angle || just_touched()))
     return "the corrector lands on another branch";
+  if (sign > 0 && fell_back(trial)) return "the corrector lands on another branch";
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
   if (sign < 0) {
     check(VecScale(trial.tangent, -1));
@@ -237,6 +239,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   check(VecScale(tangent, sign));
   auto trial = along_piece(there, tangent, reach, beyond, std::cos(steps_.max_angle));
   if (trial && !placed && orientation(trial->y, trial->tangent) < 0) return {};
+  if (trial && fell_back(*trial)) return {};
   return trial;
 }
 
@@ -252,7 +255,9 @@ std::optional<VecHandle> Continuation::tangent_at(Vec y) {
   return tangent;
 }
 
-/// A solution along the tangent of the piece that y lies on, which is off the branch by `aside`.
+/// A solution along the tangent of the piece that y lies on, which is off the branch by `aside`. Both pieces
+/// are straight: neither in the metric nor in the mean, which that does not see, may it lie farther from
+/// there.
 std::optional<Continuation::Trial> Continuation::along_piece(Vec y, Vec tangent, double reach, double aside,
                                                              double least) {
   const double on = within_piece(y, tangent, reach);
@@ -261,6 +266,8 @@ std::optional<Continuation::Trial> Continuation::along_piece(Vec y, Vec tangent,
   Trial trial = at(copy(guess));
   if (!correct(trial, row, dot(row, guess), row)) return {};
   if (!(distance(trial.y, guess) <= aside + on)) return {};
+  if (!(norm(moved(trial.y, -1, guess)) <= aside * norm(anchor_.tangent) + (aside + on) * norm(tangent)))
+    return {};
   if (!(dot(row, trial.tangent) >= least)) return {};
   return trial;
 }

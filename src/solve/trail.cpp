@@ -10,7 +10,7 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr size_t recent = 3;         // steps just made are near by nature
+constexpr size_t recent = 3;         // steps just made go the same way by nature
 constexpr double parallel = 0.98;    // cosine between directions of the same piece of a branch
 constexpr double nearness = 0.1;     // of a step's length: the chord's distance from a bent branch
 constexpr size_t round_trip = 16;    // steps at most of one round
@@ -80,7 +80,7 @@ bool Trail::circles() const {
 
 std::optional<Trail::Meeting> Trail::meeting(Vec y, Vec tangent) const {
   const Step now{project(y), project(tangent)};
-  for (size_t i = 0; i + 1 + recent < steps_.size(); ++i) {
+  for (size_t i = 0; i + 1 < steps_.size(); ++i) {
     Projection const &a = steps_[i].y, chord = minus(steps_[i + 1].y, a);
     const double square = inner(chord, chord);
     if (!(square > 0)) continue;
@@ -91,6 +91,7 @@ std::optional<Trail::Meeting> Trail::meeting(Vec y, Vec tangent) const {
     for (int k = 0; k < count; ++k) aside += std::pow(offset[k] - along * chord[k], 2);
     const double cosine = inner(now.t, chord) / (length(now.t) * std::sqrt(square));
     if (std::sqrt(aside) > nearness * std::sqrt(square) || std::abs(cosine) < parallel) continue;
+    if (cosine > 0 && i + 1 + recent >= steps_.size()) continue;
     int best = 0;
     for (int k = 1; k < count; ++k)
       if (std::abs(now.t[k]) > std::abs(now.t[best])) best = k;
