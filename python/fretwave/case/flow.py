@@ -27,21 +27,25 @@ def with_flow(case: Case, K: Term, C: Term | None, nodal_diameter: int) -> tuple
     from ..model.wheel_matrix import WheelMatrix
 
     sector = case.sector or case
-    assert sector.aerodynamics is not None and sector.neighbours is not None
+    assert sector.neighbours is not None
     number = sector.neighbours.sectors
     period = period_of(nodal_diameter, number) if case.wheel is None else None
-    added = _flow(sector, sector.aerodynamics, number).terms(sector.structure.M, period)
+    added = flow_of(sector).terms(sector.structure.M, period)
     if case.wheel is not None:
         added = {letter: {0: WheelMatrix(with_terms(None, parts), number)} for letter, parts in added.items() if parts}
     return with_terms(K, added.get("K", {})), with_terms(C, added.get("C", {}))
 
 
-def _flow(case: Case, section: AerodynamicsSection, sectors: int) -> Aerodynamics:
+def flow_of(case: Case) -> Aerodynamics:
+    """Of a sector's case with ``[aerodynamics]``."""
     from ..cyclic.aerodynamics import Aerodynamics
 
+    section, neighbours = case.aerodynamics, case.neighbours
+    assert section is not None and neighbours is not None
     omega = 2 * np.pi * section.frequency
     if section.damping is not None:
-        return Aerodynamics.from_damping({int(d): ratio for d, ratio in section.damping.items()}, sectors, omega)
+        ratios = {int(d): ratio for d, ratio in section.damping.items()}
+        return Aerodynamics.from_damping(ratios, neighbours.sectors, omega)
     coefficients = {int(k): complex(*L) for k, L in (section.influence or {}).items()}
     return Aerodynamics(coefficients, omega, None if section.dof is None else case.dof(section.dof))
 

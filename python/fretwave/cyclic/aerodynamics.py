@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import index
 from typing import Optional
 
@@ -100,6 +100,15 @@ class Aerodynamics:
         sectors, nodal_diameter = check_wave(sectors, nodal_diameter)
         theta = 2 * np.pi * nodal_diameter / sectors
         return complex(sum(L * np.exp(-1j * k * theta) for k, L in self.influence.items()))
+
+    def damping(self, nodal_diameter: int, sectors: int, omega: float) -> float:
+        """-Im L(theta) / (2 omega^2) of a wave that moves at another frequency omega [rad/s], where its terms hold L.
+
+        The damping ratio of a mode of unit modal mass. What the flow does alike in both directions damps as 1 / omega,
+        what it does unlike (Re L_k - Re L_-k) as 1 / omega^2.
+        """
+        moved = {k: complex(L.real, L.imag * omega / self.omega) for k, L in self.influence.items()}
+        return -replace(self, influence=moved).wave(nodal_diameter, sectors).imag / (2 * omega**2)
 
     def terms(self, M: Term, period: int | None = None) -> dict[str, Added]:
         """{"K": {k: (n_dof, n_dof)}, "C": {k: ...}} to be added to those of a sector.

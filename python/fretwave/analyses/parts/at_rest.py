@@ -18,6 +18,7 @@ from ...model.law_info import STATUS, STICK, Limit, Role
 from ...model.sectors import in_wave
 from ...post.contact_history import normal_force
 from ...post.slip_threshold import lasting_factors, slip_factors
+from .beside_flow import beside_flow
 from .context import AnalysisContext
 from .flutter_wave import in_wave_of, raise_if_all, without_those
 from .observed import normalised_amplitude, observed_by
@@ -32,9 +33,6 @@ if TYPE_CHECKING:
 
 #: Of a period: they miss the extremes of a harmonic motion by (pi / SAMPLES)^2 / 2 of its amplitude.
 SAMPLES = 256
-
-#: Share of its frequency by which a wave may be beside the flow's without a word.
-FAR = 0.1
 
 NO_LIMIT = "first slip: no pair sticks at rest with a sharp friction limit"
 
@@ -74,7 +72,7 @@ def mode_at_rest(context: AnalysisContext[ModeAnalysis]) -> Told:
     seen = start.attributes.get("normalise", label_of(context.analysis.normalise))
     lines = [rest_line(context, states, seconds), stuck_line(context, start.mode)]
     if with_flow_forces(context.analysis):
-        lines[-1] += _beside_flow(context, start.mode)
+        lines[-1] += beside_flow(context, start.mode, context.analysis.nodal_diameter)
     return lines + _slip_lines(context, slip, seen), _never_slips(context, slip)
 
 
@@ -93,7 +91,7 @@ def flutter_at_rest(context: AnalysisContext[FlutterAnalysis], diameters: Sequen
                 cannot[diameter] = error
                 continue
         lines = lines or [rest_line(context, states, seconds)]
-        found = f"{mode.frequency_hz:.6g} Hz{_beside_flow(context, mode)}"
+        found = f"{mode.frequency_hz:.6g} Hz{beside_flow(context, mode, diameter)}"
         lines.append(f"nodal diameter {diameter}: {found}, {_slip_lines(wave, slip)[0]}")
         slips.append(slip)
     raise_if_all(cannot, diameters)
@@ -146,18 +144,6 @@ def stuck_line(context: AnalysisContext[Any], mode: LinearMode) -> str:
     if context.case.wheel is not None:
         which += " of the whole wheel" if context.analysis.nodal_diameter is None else " of this wave on the wheel"
     return f"{which} with contact as at rest: {mode.frequency_hz:.6g} Hz"
-
-
-def _beside_flow(context: AnalysisContext[Any], mode: LinearMode) -> str:
-    """Said where the flow's coefficients hold elsewhere.
-
-    They act as springs and dampers c = 2 zeta omega_flow per modal mass: of a mode zeta omega_flow / omega.
-    """
-    section = (context.case.sector or context.case).aerodynamics
-    if section is None or abs(mode.frequency_hz / section.frequency - 1) <= FAR:
-        return ""
-    times = section.frequency / mode.frequency_hz
-    return f" (the flow's forces hold at {section.frequency:g} Hz: {times:.3g} times their damping)"
 
 
 def first_slip(context: AnalysisContext[Any], states: States, mode: LinearMode, unit: float) -> Optional[FirstSlip]:
