@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Optional
 
@@ -30,6 +31,7 @@ from .at_rest import (
     stuck_line,
 )
 from .excitation import wave_of_forces
+from .fed_modes import motions, shapes_of
 from .observed import observed_amplitude, observed_by
 from .rest import loaded_state
 from .tuned import nearest_modes, tuned_sector
@@ -79,6 +81,11 @@ class Linear:
         loss = float(np.real(phi.conj() @ (self.C @ phi)))
         return float(abs(phi.conj() @ self.P)) / (mode.omega * loss) if loss > 2 * UNDAMPED * mode.omega else np.inf
 
+    def on(self, phi: Complex) -> Linear:
+        """The same of motions in the space of columns (n_dof, n)."""
+        K, C, M = (sp.csc_matrix(phi.conj().T @ (A @ phi)) for A in (self.K, self.C, self.M))
+        return Linear(K, C, M, phi.conj().T @ self.P)
+
 
 @dataclass(frozen=True)
 class ResponseSlip:
@@ -99,8 +106,9 @@ def response_at_rest(context: Forced) -> Told:
     if closed is None:
         return [*lines, NO_LIMIT], []
     linear = _linear(context, closed)
-    peaks = _peaks(context, linear)
-    undamped = next((peak for peak in peaks if not np.isfinite(linear.peak(peak))), None)
+    sizes = _peaks(context, linear)
+    peaks = [mode for _, mode in sizes]
+    undamped = next((mode for size, mode in sizes if not np.isfinite(size)), None)
     if undamped is not None:
         return [*lines, _undamped_line(context, _slip_at(context, states, undamped, mode))], []
     ends = [2 * np.pi * hertz for hertz in context.analysis.frequency]
@@ -126,16 +134,33 @@ def _solved(context: Forced) -> tuple[States, LinearMode, float]:
     return states, mode, time.perf_counter() - began
 
 
-def _peaks(context: Forced, linear: Linear) -> list[LinearMode]:
-    """Stuck modes with frequencies in the range that answer the force most. Collective."""
+def _peaks(context: Forced, linear: Linear) -> list[tuple[float, LinearMode]]:
+    """Stuck modes with frequencies in the range that answer the force most, and how much. Collective."""
     low, high = (2 * np.pi * hertz for hertz in context.analysis.frequency)
     count = MOST_PEAKS if context.case.wheel is None else max(MOST_PEAKS, 2 * context.wheel.sectors)
     try:
         modes = nearest_modes(context, 0.5 * (low + high), min(context.model.n_dof, count))
     except NothingMoves:
         return []
-    inside = [mode for mode in modes if low <= mode.omega <= high and linear.drives(mode)]
-    return sorted(inside, key=linear.peak, reverse=True)[:MOST_PEAKS]
+    flow = context.analysis.aerodynamics
+    sizes = _under_flow(context, linear, modes) if flow else [(linear.peak(mode), mode) for mode in modes]
+    inside = [item for item in sizes if low <= item[1].omega <= high and linear.drives(item[1])]
+    return sorted(inside, key=lambda item: item[0], reverse=True)[:MOST_PEAKS]
+
+
+def _under_flow(context: Forced, linear: Linear, modes: Sequence[LinearMode]) -> list[tuple[float, LinearMode]]:
+    """What the flow, which moves their frequencies and damps or feeds them, makes of modes."""
+    from ...model.modes import LinearMode
+
+    phi, (values, shares, own) = shapes_of(modes), motions(context, modes)
+    few, found = linear.on(phi), []
+    for value, share in zip(values[own], shares[:, own].T):
+        damped, motion = abs(value.real) > UNDAMPED * abs(value), phi @ share
+        if value.imag > 0:
+            answer = few.response(value.imag) if damped else None
+            size = np.inf if answer is None else float(np.linalg.norm(answer.shape + 1j * answer.imaginary))
+            found.append((size, LinearMode(float(value.imag), -float(value.real), motion.real, motion.imag)))
+    return found
 
 
 def _linear(context: Forced, closed: sp.csc_matrix) -> Linear:
