@@ -1,9 +1,9 @@
-"""What else grows beside a stable limit cycle: modes of its own wave, or of the whole wheel."""
+"""What else grows beside a stable limit cycle or a steady response: modes of its own wave, or of the whole wheel."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +13,7 @@ from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...cyclic.engine_order import folded
 from ...errors import FretwaveError
 from ...post.largest import largest
-from ...post.limit_cycles import STUCK
+from ...post.limit_cycles import STUCK, others
 from .context import AnalysisContext
 from .fed_modes import FED, fed_modes, motions, shapes_of, told
 from .tuned import in_waves
@@ -48,21 +48,46 @@ def fed_beside(context: AnalysisContext[HarmonicSection], start: Start, first: c
     """
     if context.case.wheel is None:
         return fed_modes(context, start.mode)
-    return _on_tuned(context, start) if context.wheel.deviations is None else _on_mistuned(context, start.mode, first)
+    if context.wheel.deviations is None:
+        return _on_tuned(context, start.tuned)
+    return _on_mistuned(context, start.mode, first)
 
 
-def _on_tuned(context: AnalysisContext[HarmonicSection], start: Start) -> list[dict[str, Any]]:
-    """Wave by wave, each on one sector. Collective."""
+def fed_under_force(context: AnalysisContext[HarmonicSection]) -> list[str]:
+    """A line of the modes that gain energy by themselves, beside which steady responses may not last; often none.
+
+    Sought where something may feed them: the flow, or a damper below zero. Collective.
+    """
+    C = context.case.damping_with(context.analysis.dampers)
+    if not (context.analysis.aerodynamics or (C is not None and C.diagonal().min() < 0)):
+        return []
+    try:
+        fed, why = _of_any_wave(context), ""
+    except FretwaveError as error:  # on all ranks
+        fed, why = [], error.what
+    context.entry["fed"] = fed
+    return [f"whether the responses are stable is not known{others(fed, why)}"] if fed or why else []
+
+
+def _of_any_wave(context: AnalysisContext[HarmonicSection]) -> list[dict[str, Any]]:
+    """Modes that gain energy: of a sector in its wave. Collective."""
+    if context.case.wheel is None:
+        return fed_modes(context, None)
+    return _on_tuned(context) if context.wheel.deviations is None else _on_mistuned(context)
+
+
+def _on_tuned(context: AnalysisContext[HarmonicSection], tuned: Optional[LinearMode] = None) -> list[dict[str, Any]]:
+    """Wave by wave, each on one sector, but the followed mode of its own. Collective."""
     found, sectors = [], context.wheel.sectors
     own = folded(nodal_diameter(context.analysis), sectors)
     for wave, sector in in_waves(context, sorted(folded(k, sectors) for k in range(sectors))):
-        followed = start.tuned if wave == own else None
+        followed = tuned if wave == own else None
         found += [{**mode, "diameters": wave} for mode in fed_modes(sector, followed)]
     return found
 
 
 def _on_mistuned(
-    context: AnalysisContext[HarmonicSection], followed: LinearMode, first: complex
+    context: AnalysisContext[HarmonicSection], followed: Optional[LinearMode] = None, first: complex = 0j
 ) -> list[dict[str, Any]]:
     """On all sectors, with contact that sticks: of the families up to the followed one and the next. Collective.
 
@@ -78,10 +103,11 @@ def _on_mistuned(
     modes = context.linear_mode(STUCK, min(context.model.n_dof, sectors * (family + 1)))
     values, shares, own = motions(context, modes)
     M, phi = context.case.M, shapes_of(modes)
-    alike = np.abs(shares.conj().T @ (phi.conj().T @ (M @ (followed.shape + 1j * followed.imaginary))))
     grows = own & (values.real > FED * np.abs(values))
-    like = own & (alike > 0.5 * alike[own].max())
-    grows[np.argmin(np.where(like, np.abs(values - first), np.inf))] = False
+    if followed is not None:
+        alike = np.abs(shares.conj().T @ (phi.conj().T @ (M @ (followed.shape + 1j * followed.imaginary))))
+        like = own & (alike > 0.5 * alike[own].max())
+        grows[np.argmin(np.where(like, np.abs(values - first), np.inf))] = False
     return [
         {"diameters": _largest_wave(context, motion), "contact": STUCK, **told(value)}
         for value, motion in zip(values[grows], (phi @ shares[:, grows]).T)

@@ -33,6 +33,7 @@ from .at_rest import (
 from .excitation import wave_of_forces
 from .fed_modes import motions, shapes_of
 from .observed import observed_amplitude, observed_by
+from .others import fed_under_force
 from .rest import loaded_state
 from .tuned import nearest_modes, tuned_sector
 
@@ -101,7 +102,7 @@ def response_at_rest(context: Forced) -> Told:
     if not context.case.contacts:
         return [], []
     states, mode, seconds = _solved(context)
-    lines = [rest_line(context, states, seconds), stuck_line(context, mode)]
+    lines = [rest_line(context, states, seconds), stuck_line(context, mode), *fed_under_force(context)]
     closed = _closed(context, states)
     if closed is None:
         return [*lines, NO_LIMIT], []

@@ -1,0 +1,44 @@
+"""A wheel of masses on ground springs (1 kg, 1 N/m), a slider of 1 N/m between each and the next, and the flow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+SECTORS, OMEGA, LIMIT = 5, 1.7, 1.0
+
+
+def case_of(influence: dict[int, complex], order: int, keys: str = "", damper: float = 0.0) -> str:
+    """TOML of a response to an engine order; `damper` [N s/m] holds each mass to the ground."""
+    flow = ", ".join(f"{k} = [{L.real}, {L.imag}]" for k, L in influence.items())
+    return f"""
+[model]
+dofs = ["mass", "next"]
+M = [[1.0, 0.0], [0.0, 0.0]]
+K = [[1.0, 0.0], [0.0, 0.0]]
+C = [[{damper}, 0.0], [0.0, 0.0]]
+sectors = {SECTORS}
+low = ["mass"]
+high = ["next"]
+
+[[contact]]
+name = "between"
+law = "jenkins"
+pairs = [["mass", "next"]]
+tangential_stiffness = 1.0
+friction_limit = {LIMIT}
+
+[aerodynamics]
+frequency = {OMEGA / (2 * np.pi)!r}
+influence = {{ {flow} }}
+
+[[analysis]]
+name = "forced"
+type = "forced"
+engine_order = {order}
+{keys}
+harmonics = 1
+force = {{ mass = 1.0 }}
+levels = [1e-4, 10.0]
+frequency = [0.2, 0.3]
+observe = "mass"
+"""
