@@ -7,15 +7,15 @@ import numpy as np
 SECTORS, OMEGA, LIMIT = 5, 1.7, 1.0
 
 
-def case_of(influence: dict[int, complex], order: int, keys: str = "", damper: float = 0.0) -> str:
-    """TOML of a response to an engine order; `damper` [N s/m] holds each mass to the ground."""
+def wheel_of(influence: dict[int, complex], damper: float = 0.0, spin: float = 0.0) -> str:
+    """TOML of the model; `damper` holds each mass to the ground, `spin` [N s/m] is gyroscopic between neighbours."""
     flow = ", ".join(f"{k} = [{L.real}, {L.imag}]" for k, L in influence.items())
     return f"""
 [model]
 dofs = ["mass", "next"]
 M = [[1.0, 0.0], [0.0, 0.0]]
 K = [[1.0, 0.0], [0.0, 0.0]]
-C = [[{damper}, 0.0], [0.0, 0.0]]
+C = [[{damper}, {spin}], [{-spin}, 0.0]]
 sectors = {SECTORS}
 low = ["mass"]
 high = ["next"]
@@ -30,7 +30,14 @@ friction_limit = {LIMIT}
 [aerodynamics]
 frequency = {OMEGA / (2 * np.pi)!r}
 influence = {{ {flow} }}
+"""
 
+
+def case_of(influence: dict[int, complex], order: int, keys: str = "", damper: float = 0.0) -> str:
+    """TOML of a response to an engine order, with further keys of the analysis."""
+    return (
+        wheel_of(influence, damper)
+        + f"""
 [[analysis]]
 name = "forced"
 type = "forced"
@@ -42,3 +49,4 @@ levels = [1e-4, 10.0]
 frequency = [0.2, 0.3]
 observe = "mass"
 """
+    )

@@ -13,13 +13,14 @@ import scipy.sparse as sp
 from ...arrays import Complex
 from ...case.harmonic import nodal_diameter, with_flow_forces
 from ...case.observed import dof_of
+from ...cyclic.engine_order import folded
 from ...post.largest import largest
-from .asymptotes import most_like, other_asymptote
+from .asymptotes import MORE_MODES, most_like, other_asymptote
 from .context import AnalysisContext
 from .fed_modes import motions, shapes_of
 from .gyroscopic import TOLD, gyroscopic_shift
 from .observed import observed_by
-from .rest import modes_or_free, rest_state, start_mode, stuck_or_free
+from .rest import modes_or_free, rest_state, start_mode
 from .tuned import nearest_modes, nearest_or_free, tuned_sector
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
     rest = rest_state(context)
     mode = None
     if mistuned and analysis.nodal_diameter is None:
-        mode = stuck_or_free(context, analysis.linear_mode)
+        mode = _numbered(context)
         context = context.of(_family(context, mode))
     tuned, asymptotes = _tuned(context)
     analysis = context.analysis
@@ -120,6 +121,26 @@ def tuned_amplitude(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -
     return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.wheel.sectors))
 
 
+def _numbered(context: AnalysisContext[ModeAnalysis]) -> LinearMode:
+    """A mode of the mistuned wheel by its number; where waves are parted that of their motions. Collective.
+
+    A standing shape is as near to one motion of a pair as to the other, and both would lead to the same branch.
+    """
+    number, sectors = context.analysis.linear_mode, context.wheel.sectors
+    lowest = modes_or_free(context, number)
+    standing = context.numbered(lowest, number)
+    if not _parted(context, lowest):
+        return standing
+    family = sectors * -(-number // sectors)
+    modes = modes_or_free(context, min(context.model.n_dof, family + MORE_MODES))
+    values, shares, own = motions(context, modes)
+    found = sorted(np.flatnonzero(own & (values.imag > 0)), key=lambda one: abs(values[one]))
+    if len(found) < len(modes):  # some do not swing
+        return standing
+    motion = shapes_of(modes) @ shares[:, found[number - 1]]
+    return replace(standing, shape=motion.real.copy(), imaginary=motion.imag.copy())
+
+
 def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAnalysis:
     """The analysis with the tuned wave that has the largest share in a mode of the mistuned wheel. Collective.
 
@@ -127,16 +148,17 @@ def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAna
     """
     analysis = context.analysis
     wheel = context.wheel
-    shape = wheel.by_sector(mode.shape)
+    shape = wheel.by_sector(mode.shape + 1j * mode.imaginary)
     M = sp.csr_matrix(context.tuned.M)
-    waves = np.fft.ifft(shape, axis=0)[: wheel.sectors // 2 + 1]
-    diameters = int(np.argmax([np.real(c.conj() @ (M @ c)) for c in waves]))
+    waves = np.fft.ifft(shape, axis=0)
+    most = largest(np.array([np.real(c.conj() @ (M @ c)) for c in waves]))
+    diameters = folded(most, wheel.sectors)
     named = analysis.model_copy(update={"nodal_diameter": diameters})
     count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
     with tuned_sector(context.of(named)) as sector:
         rest_state(sector)  # numbers are those of the pairs that it closes
         modes = modes_or_free(sector, count)
-    shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
+    shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[most])) for m in modes]
     return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
 
 
@@ -190,9 +212,13 @@ def _most_alike(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> Li
     wave = wave_mode(tuned, nodal_diameter(analysis), wheel.sectors)
     modes = nearest_or_free(context, tuned.omega, wheel.sectors)
     standing = most_alike(modes, wave, context.case.M)
-    C = context.case.damped(analysis.dampers).C
-    parted = with_flow_forces(analysis) or gyroscopic_shift(modes, C) > TOLD
-    return _running(context, modes, wave, standing) if parted else standing
+    return _running(context, modes, wave, standing) if _parted(context, modes) else standing
+
+
+def _parted(context: AnalysisContext[ModeAnalysis], modes: Sequence[LinearMode]) -> bool:
+    """Whether the flow or gyroscopic forces part the waves that run forward from those that run backward."""
+    C = context.case.damped(context.analysis.dampers).C
+    return with_flow_forces(context.analysis) or gyroscopic_shift(modes, C) > TOLD
 
 
 def _running(
