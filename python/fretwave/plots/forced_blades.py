@@ -16,6 +16,7 @@ from ..results.reader import Run
 from . import marks, scales, style
 from .forced import smooth
 
+BOUND = "Whitehead's bound (linear, one family, waves damped alike)"
 #: share of the largest amplitude below which a curve lies on its axis
 SEEN = 0.03
 
@@ -38,7 +39,7 @@ def draw(forced: Analysis, blades: Table, tuned: Table) -> Figure:
         lower.plot(sectors, blades["amplification"][rows], "o-", color=colour, linewidth=1.0, label=f"level {level:g}")
     bound = whitehead(len(sectors))
     lower.axhline(1.0, color=style.GREY, linestyle="--", linewidth=1.2, label="tuned wheel")
-    lower.axhline(bound, color=style.GREY, linestyle=":", linewidth=1.2, label="Whitehead's bound (linear, one family)")
+    lower.axhline(bound, color=style.GREY, linestyle=":", linewidth=1.2, label=BOUND)
     lower.set_ylim(bottom=0.0, top=1.25 * max(bound, float(np.nanmax(blades["amplification"]))))  # room for the legend
     lower.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=13))
     lower.set_xlabel("Sector")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Optional
 
 from ..case.analysis import AnalysisSection
+from ..case.harmonic import HarmonicSection
 from ..case.load import Case
+from ..texts import toml
 
 
 def left_out_lines(
@@ -39,15 +41,28 @@ def _line(where: str, reasons: Sequence[str]) -> str:
 
 def _of_an_analysis(case: Case, analysis: AnalysisSection) -> list[str]:
     """What it does not say itself."""
-    harmonic, found = analysis.settings(case).harmonic(), []
+    harmonic = analysis.settings(case).harmonic()
+    found = _of_the_flow(case, analysis, harmonic)
     if harmonic is None:
-        return []
+        return found
     if case.neighbours is not None and (analysis.wears or not harmonic.wheel):
         others, of_one = case.neighbours.sectors - 1, ": work and worn volumes are of one" if analysis.wears else ""
         found.append(f"{others} of {others + 1} sectors (a wave moves them as this one, each a phase later{of_one})")
     if not harmonic.errors:
         found.append("errors of the points (errors = false)")
     return found
+
+
+def _of_the_flow(case: Case, analysis: AnalysisSection, harmonic: Optional[HarmonicSection]) -> list[str]:
+    """That a case has forces which this analysis does not take."""
+    if (
+        case.aerodynamics is None
+        or analysis.type == "sweep"
+        or (harmonic is not None and (harmonic.aerodynamics or harmonic.follows_waves()))
+    ):
+        return []
+    why = f"type = {toml(analysis.type)} has none" if harmonic is None else "aerodynamics = false"
+    return [f"the forces of the flow ({why})"]
 
 
 def _of_the_run(case: Case, names: Sequence[str], said: Sequence[str], plots: bool) -> list[str]:

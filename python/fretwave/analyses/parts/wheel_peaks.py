@@ -1,8 +1,9 @@
 """Peaks of a whole wheel's forced response, blade by blade, against the tuned wheel's.
 
 Amplification is the largest peak of any blade over the peak of the tuned wheel under the same force. For one family of
-modes, one degree of freedom a blade and no friction it is at most (1 + sqrt(N)) / 2 (Whitehead, J. Mech. Eng. Sci. 8,
-1966).
+modes, one degree of freedom a blade, waves that are damped alike and no friction it is at most (1 + sqrt(N)) / 2
+(Whitehead, J. Mech. Eng. Sci. 8, 1966). A flow damps them unlike, and mistuning then leads the work of the force into
+waves that it damps less.
 """
 
 from __future__ import annotations
@@ -47,11 +48,12 @@ def blade_by_blade(
         context.write_table(suffix, columns)
     rows = [{key: float(values[k]) for key, values in peaks.items()} for k in range(len(peaks["level"]))]
     context.entry["peaks"] = rows
-    bound = whitehead(context.case.wheel.sectors) if context.case.wheel else np.nan
+    bound = f"{whitehead(context.case.wheel.sectors) if context.case.wheel else np.nan:.3f}"
+    bound += " is of waves that the flow damps alike" * excitation.analysis.aerodynamics
     unit = context.units("length")
     more = beyond(table, amplitudes, blades)
     ends = [_at_an_end(more.get(row["level"]), unit) for row in rows]
-    return [f"{context.name}: {_line(row, unit)} (Whitehead's bound {bound:.3f}){end}" for row, end in zip(rows, ends)]
+    return [f"{context.name}: {_line(row, unit)} (Whitehead's bound {bound}){end}" for row, end in zip(rows, ends)]
 
 
 def _at_an_end(found: Optional[tuple[int, float]], unit: str) -> str:
@@ -65,9 +67,11 @@ def _line(row: Mapping[str, float], unit: str) -> str:
     if not np.isfinite(row["amplitude"]):
         return f"level {row['level']:g}: no peak within the frequency range"
     peak = f"{row['amplitude']:.4g}{plus_minus(row['amplitude_error'])} {unit}"
+    largest = f"level {row['level']:g}: largest peak a = {peak} at {row['frequency_hz']:.5g} Hz in sector"
+    if not np.isfinite(row["tuned_amplitude"]):
+        return f"{largest} {row['sector']:.0f}, and of the tuned wheel no peak within the frequency range"
     return (
-        f"level {row['level']:g}: largest peak a = {peak} at {row['frequency_hz']:.5g} Hz in"
-        f" sector {row['sector']:.0f}, {row['amplification']:.4f} times the tuned {row['tuned_amplitude']:.4g} {unit}"
+        f"{largest} {row['sector']:.0f}, {row['amplification']:.4f} times the tuned {row['tuned_amplitude']:.4g} {unit}"
         f" at {row['tuned_frequency_hz']:.5g} Hz"
     )
 
