@@ -25,7 +25,7 @@ from ..case.observed import Observed, check_observed, dofs_of, label_of
 from ..columns import FLUTTER
 from ..cyclic.engine_order import folded
 from ..errors import InputError
-from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
+from ..post.flutter_waves import DECAYS, STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FLUTTER_WAVES
 from .mode import point_line
@@ -35,7 +35,7 @@ from .parts.context import AnalysisContext, Outcome
 from .parts.fed_modes import fed_modes
 from .parts.flutter_wave import in_wave_of, raise_if_all, what_to_do, why_not
 from .parts.observed import named
-from .parts.others import with_others
+from .parts.others import found_of, with_others
 from .parts.rest import keep_pairs, rest_state, retained, start_mode, stuck_or_free
 from .parts.several import ending_of, refused_before, stopped_before, with_refused, with_stopped
 
@@ -166,7 +166,7 @@ def _all_waves(
     table = finished_table(writer)
     waves = context.comm.bcast(describe_waves(table, diameters) if table else [])
     for wave in waves:
-        wave["limit_cycles"] = _beside_other_families(context, wave["nodal_diameter"], wave["limit_cycles"])
+        wave.update(_beside_other_families(context, wave))
     cycles = [cycle for wave in waves for cycle in wave["limit_cycles"]]
     if waves:  # before the first point there is no folder to write to
         _write(context, waves, cycles)
@@ -182,19 +182,22 @@ def _all_waves(
     return Outcome(writer.rows, reason, not stopped, summary, goal, advice)
 
 
-def _beside_other_families(
-    context: AnalysisContext[FlutterAnalysis], diameter: int, cycles: Sequence[dict[str, Any]]
-) -> list[dict[str, Any]]:
-    """A wave's limit cycles with the families that grow beside a stable one. Collective."""
-    if not any(cycle["stable"] for cycle in cycles):
-        return list(cycles)
-    with in_wave_of(context, diameter) as own_context:
+def _beside_other_families(context: AnalysisContext[FlutterAnalysis], wave: Mapping[str, Any]) -> dict[str, Any]:
+    """Its limit cycles with the families that grow beside a stable one; without those of a wave that decays `fed`.
+
+    Collective.
+    """
+    cycles = wave["limit_cycles"]
+    stable = any(cycle["stable"] for cycle in cycles)
+    if not stable and wave["verdict"] not in DECAYS:
+        return {}
+    with in_wave_of(context, wave["nodal_diameter"]) as own_context:
 
         def fed() -> list[dict[str, Any]]:
             rest_state(own_context)
             return fed_modes(own_context, stuck_or_free(own_context, context.analysis.linear_mode))
 
-        return with_others(fed, cycles)
+        return {"limit_cycles": with_others(fed, cycles)} if stable else found_of(fed)
 
 
 class _Wave:
@@ -261,7 +264,7 @@ def _write(
     context: AnalysisContext[FlutterAnalysis], waves: Sequence[Mapping[str, Any]], cycles: Sequence[Mapping[str, Any]]
 ) -> None:
     """``<name>_waves.csv``, a line for each nodal diameter, and ``<name>_crossings.csv``, one for each limit cycle."""
-    names = [name for name in waves[0] if name != "limit_cycles"]
+    names = [name for name in waves[0] if name not in ("limit_cycles", "fed", "not_looked_at")]
     context.write_table("waves", {name: [wave[name] for wave in waves] for name in names})
     plain = [{**cycle, "stable": STABLE[cycle["stable"]]} for cycle in cycles]
     for cycle in plain:

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .limit_cycles import limit_cycles, place, stability
+from .limit_cycles import limit_cycles, others, place, stability
 from .mode_curve import NO_DAMPING, most_damped, without_rounding
 
 #: Of a wave whose damping changes its sign, but at no point: the corrector failed there, or the two zeros beside a peak
 #: are nearer to each other than the branch's own cubic tells.
 NOT_LOCATED = "limit cycle not located"
+#: Verdicts of a wave whose small motions do not grow in this family; in others they may.
+DECAYS = ("neutral", "stable", "stable below")
 STABLE = {True: "stable", False: "unstable", None: "unknown"}
 
 
@@ -105,6 +107,7 @@ def words(wave: Mapping[str, Any], unit: str, stopped: bool = False) -> str:
     first = 100 * without_rounding(wave["zeta"])
     stuck = f"{wave['frequency_hz']:.5g} Hz, {first:+.3g} % at the smallest amplitude"
     beyond = f" (the branch stopped early, at most {last}: what is beyond is not known)" if stopped else ""
+    fate += others(wave.get("fed", []), wave.get("not_looked_at", ""))
     return f"ND {with_sign(wave['nodal_diameter'])}, {stuck}: {fate}{beyond}"
 
 

@@ -24,17 +24,19 @@ if TYPE_CHECKING:
 
 
 def with_others(fed: Callable[[], list[dict[str, Any]]], cycles: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Limit cycles, to stable ones added `fed`, the modes beside theirs that gain energy. Collective.
-
-    Where modes are not to be had, `not_looked_at` says why.
-    """
+    """Limit cycles, to stable ones added `fed`, the modes beside theirs that gain energy. Collective."""
     if not any(cycle["stable"] for cycle in cycles):
         return list(cycles)
-    try:
-        added: dict[str, Any] = {"fed": fed()}
-    except FretwaveError as error:  # on all ranks
-        added = {"not_looked_at": error.what}
+    added = found_of(fed)
     return [{**cycle, **(added if cycle["stable"] else {})} for cycle in cycles]
+
+
+def found_of(fed: Callable[[], list[dict[str, Any]]]) -> dict[str, Any]:
+    """`fed`, modes that gain energy or, where they are not to be had, `not_looked_at`, which says why. Collective."""
+    try:
+        return {"fed": fed()}
+    except FretwaveError as error:  # on all ranks
+        return {"not_looked_at": error.what}
 
 
 def fed_beside(context: AnalysisContext[HarmonicSection], start: Start, first: complex) -> list[dict[str, Any]]:
@@ -61,12 +63,10 @@ def fed_under_force(context: AnalysisContext[HarmonicSection]) -> list[str]:
     C = context.case.damping_with(context.analysis.dampers)
     if not (context.analysis.aerodynamics or (C is not None and C.diagonal().min() < 0)):
         return []
-    try:
-        fed, why = _of_any_wave(context), ""
-    except FretwaveError as error:  # on all ranks
-        fed, why = [], error.what
-    context.entry["fed"] = fed
-    return [f"whether the responses are stable is not known{others(fed, why)}"] if fed or why else []
+    found = found_of(lambda: _of_any_wave(context))
+    context.entry.update(found)
+    told = others(found.get("fed", []), found.get("not_looked_at", ""))
+    return [f"whether the responses are stable is not known{told}"] if told else []
 
 
 def _of_any_wave(context: AnalysisContext[HarmonicSection]) -> list[dict[str, Any]]:
