@@ -9,6 +9,9 @@ import pytest
 from command_line import call
 from models.flow_chain import OMEGA, SECTORS, case_of, wheel_of
 
+from fretwave.case.load import load_case
+from fretwave.errors import CaseErrors
+
 DEVIATIONS = [-0.14, -0.21, -0.12, -0.37, -0.14]
 RATIOS = {-2: 0.01, -1: 0.01, 0: 0.01, 1: 0.06, 2: 0.01}
 #: Waves other than the driven one are damped less.
@@ -67,3 +70,27 @@ def test_linear_modes_are_told_to_be_without_the_flow(tmp_path, capfd):
     path.write_text(wheel_of(FLOW) + LINEAR, encoding="utf-8")
     assert call("run", path, "--out", tmp_path / "run", "--no-plots") == 0
     assert 'the forces of the flow (type = "linear" has none)' in capfd.readouterr().out
+
+
+MODE = '[[analysis]]\nname = "mode"\ntype = "mode"\nnormalise = "mass"\namplitude = [0.2, 1.0]\nharmonics = 1\n'
+ACTS = "aerodynamics = true\n"
+ASKED = {
+    "mode": (f"{wheel_of({})}{MODE}{ACTS}nodal_diameter = 2\n", "2"),
+    "forced": (case_of({}, 2, ACTS), "2"),
+    "mistuned": (case_of({}, 1, f"{ACTS}wheel = true\nmistuning = {{ standard_deviation = 0.01 }}"), "-2, 0, 2"),
+    "damped": (case_of({}, 4, ACTS), ""),
+    "without flow": (case_of({}, 2), ""),
+}
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("text, missing", ASKED.values(), ids=ASKED)
+def test_a_wave_without_damping_is_asked_for_by_every_analysis(tmp_path, text, missing):
+    """The flow did nothing to it, and nothing was said."""
+    path = tmp_path / "case.toml"
+    path.write_text(text.replace("influence = {  }", "damping = { 1 = -0.01, -1 = 0.02 }"), encoding="utf-8")
+    if not missing:
+        assert load_case(path).aerodynamics.damping == {"1": -0.01, "-1": 0.02}
+        return
+    with pytest.raises(CaseErrors, match=f"damping of nodal diameters {missing} in"):
+        load_case(path)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional
 from ..case.analysis import register_analysis
 from ..case.checks_common import about
 from ..case.fields import Positive, Size, Whole, key
-from ..case.flow import WHOLE
+from ..case.flow import check_damped
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, label_of
 from ..columns import FLUTTER
@@ -115,15 +115,8 @@ class FlutterAnalysis(HarmonicSection):
                 expected = f"-{half} .. {half}, negative for backward waves"
                 fix = f"write {folded(diameters, sectors)}, the same wave, or take it out"
                 report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, fix)
-        section = facts.flow
-        if section is None or section.damping is None:
-            return
-        named = {int(text) % sectors for text in section.damping if WHOLE.fullmatch(text)}
-        missing = [d for d in self.waves(sectors) if d % sectors not in named]
-        if missing:
-            key = "type" if self.nodal_diameters is None else "nodal_diameters"
-            expected = f"damping of nodal diameters {', '.join(map(str, missing))} in [aerodynamics]"
-            report.wrong((key,), "looks at waves without a damping", expected, "add it, or name nodal_diameters")
+        key = "type" if self.nodal_diameters is None else "nodal_diameters"
+        check_damped(report, key, self.waves(sectors), facts)
 
     def headline(self) -> str:
         low, high = self.amplitude

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ WHOLE = re.compile("-?[0-9]{1,9}")
 if TYPE_CHECKING:
     from ..cyclic.aerodynamics import Aerodynamics
     from ..model.sectors import Term
+    from .facts import Facts
     from .load import Case
 
 
@@ -56,6 +57,19 @@ def check_aerodynamics(
     """Coefficients of blades that the wheel has, given in one way."""
     if section is not None:
         _check_section(Reporter(source, ("aerodynamics",), found), section, sectors, dofs)
+
+
+def check_damped(report: Reporter, key: str, waves: Iterable[int], facts: Facts) -> None:
+    """Waves that an analysis looks at are among those whose damping by the flow is given."""
+    section, sectors = facts.flow, facts.sectors
+    if section is None or section.damping is None or sectors is None:
+        return
+    named = {int(text) % sectors for text in section.damping if WHOLE.fullmatch(text)}
+    missing = [d for d in waves if d % sectors not in named]
+    if missing:
+        expected = f"damping of nodal diameters {', '.join(map(str, missing))} in [aerodynamics]"
+        fix = "add it (0.0 where there is none)" + (", or name nodal_diameters" if key != "aerodynamics" else "")
+        report.wrong((key,), "looks at waves without a damping", expected, fix)
 
 
 def _check_section(report: Reporter, section: AerodynamicsSection, sectors: int | None, dofs: Sequence[str]) -> None:

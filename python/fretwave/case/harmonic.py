@@ -14,6 +14,7 @@ from .analysis_tables import MistuningSection, StepSection
 from .checks_size import harmonic_memory
 from .checks_wheel import check_wave, check_wheel
 from .fields import Positive, Whole, key
+from .flow import check_damped
 from .schema import PreloadSection
 
 if TYPE_CHECKING:
@@ -112,6 +113,14 @@ class HarmonicSection(AnalysisSection):
             if self.aerodynamics and not facts.has_flow:
                 fix = "add [aerodynamics]"
                 report.wrong(("aerodynamics",), "needs forces of the flow", "a table [aerodynamics]", fix)
+            if self.aerodynamics and facts.sectors is not None:
+                check_damped(report, "aerodynamics", self._moving(facts.sectors), facts)
+
+    def _moving(self, sectors: int) -> list[int]:
+        """Nodal diameters of the waves that its motion is made of: of a mistuned wheel all."""
+        if self.mistuning is not None:
+            return list(range(-((sectors - 1) // 2), sectors // 2 + 1))
+        return [] if self.nodal_diameter is None else [self.nodal_diameter]
 
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
         return harmonic_memory(self.harmonics, self.samples, (facts.sectors or 1) if self.wheel else 1, facts)
