@@ -16,7 +16,8 @@ pi Im L |q|^2 on the blade: Im L > 0 feeds the vibration. L_k holds at one frequ
 
 one term in K and one in C for each k, of real matrices, like any other coupling between sectors, valid for a wave on
 one sector and for a wheel of any mistuning. They are not reciprocal (L_-k is not L_k): the flow is not at rest, and it
-may feed a forward wave and damp the backward one. Higher harmonics, and the mean, feel the same springs and dampers.
+may feed a forward wave and damp the backward one. Higher harmonics, and the mean's way from a state at rest, feel the
+same springs and dampers; the state at rest itself is that without them.
 
 References
 ----------

@@ -11,7 +11,14 @@ import scipy.sparse.linalg
 
 from ...arrays import Array
 from ...case.analysis import AnalysisSection
-from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, nodal_diameter, retained_by
+from ...case.harmonic import (
+    LEAST_HARMONICS,
+    LEAST_SAMPLES,
+    HarmonicSection,
+    nodal_diameter,
+    retained_by,
+    with_flow_forces,
+)
 from ...case.schema import PreloadSection
 from ...errors import InputError, NothingMoves
 from ...model.contact import Contact
@@ -19,10 +26,12 @@ from ...model.law_info import Role
 from ...model.laws import own_load
 from .asymptotes import MORE_MODES, closed_stiffness, limit_model, most_like, with_friction
 from .context import AnalysisContext
+from .still import held_by_flow, still_model
 
 if TYPE_CHECKING:
     from ...case.load import Case
     from ...hb.harmonics import Harmonics
+    from ...model.model import Model
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...results.results import AnalysisWriter
@@ -54,6 +63,8 @@ def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Rest]:
 def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0) -> Rest:
     """The same also without [preload], where what pairs press with by themselves moves the structure. Collective.
 
+    Coefficients of the flow are of vibrations: it stands as without them, and they act on what moves it from there.
+
     Parameters
     ----------
     factor : float
@@ -69,7 +80,15 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
     load = factor * np.sum([np.zeros(context.model.n_dof), *given], axis=0)
     closed = None if context.case.neighbours is not None else just_touching(context, section, load)
     names = context.case.dofs
-    return static_preload(context.model, load, reference, closed=closed, balance=section.balanced, names=names)
+
+    def under(model: Model, load: Array) -> Rest:
+        return static_preload(model, load, reference, closed=closed, balance=section.balanced, names=names)
+
+    if not with_flow_forces(context.analysis):
+        return under(context.model, load)
+    with still_model(context) as still:
+        displacement = under(still, load).displacement
+    return under(context.model, load + held_by_flow(context, displacement))
 
 
 def pressed(contacts: Sequence[Contact], section: PreloadSection) -> bool:
