@@ -1,8 +1,8 @@
 """One run at a time in a folder.
 
 The lock is the kernel's (``flock`` on ``.lock``): it ends with its process, however that ends, so that no stale one is
-left by a kill. Where a network file system keeps such locks to one host, the file says who runs, and its time is set
-anew every few seconds: a run on another host counts as alive as long as that goes on.
+left by a kill. Where a network file system keeps such locks to one host, or knows none, the file says who runs, and its
+time is set anew every few seconds: a run that no lock tells of counts as alive as long as that goes on.
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ class FolderLock:
         with told(self.path):
             descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
-            _seize(descriptor)
+            locked = _seize(descriptor)
             if not _is_in_place(descriptor, self.path):  # its holder removed it just now
                 os.close(descriptor)
                 return self.take()
-            _check_other_hosts(self.path, _holder(descriptor))
+            _check_signs(self.path, _holder(descriptor), locked)
             with told(self.path):
                 os.ftruncate(descriptor, 0)
                 os.lseek(descriptor, 0, os.SEEK_SET)
@@ -104,8 +104,8 @@ def check_free(folder: Path) -> None:
     except OSError:  # nobody has been here, or may write here: that is found when the run begins to write
         return
     try:
-        _seize(descriptor)
-        _check_other_hosts(path, _holder(descriptor))
+        locked = _seize(descriptor)
+        _check_signs(path, _holder(descriptor), locked)
     except BlockingIOError:
         raise _in_use(path, _holder(descriptor)) from None
     finally:
@@ -128,18 +128,19 @@ def _is_in_place(descriptor: int, path: Path) -> bool:
         return False
 
 
-def _seize(descriptor: int) -> None:
-    """Take the kernel's lock; where the file system knows none, the signs of life must do."""
+def _seize(descriptor: int) -> bool:
+    """Take the kernel's lock; False where the file system knows none, and the signs of life must do."""
     for tries in reversed(range(4)):  # one who only looks has it for an instant
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return
+            return True
         except OSError as error:
             if error.errno not in TAKEN:
-                return
+                return False
             if not tries:
                 raise BlockingIOError(error.errno, error.strerror) from None
             time.sleep(0.05)
+    return False
 
 
 def _self() -> dict[str, Any]:
@@ -154,13 +155,26 @@ def _holder(descriptor: int) -> dict[str, Any]:
     return {}
 
 
-def _check_other_hosts(path: Path, holder: dict[str, Any]) -> None:
-    if not holder or holder.get("host") == socket.gethostname():
+def _check_signs(path: Path, holder: dict[str, Any], locked: bool) -> None:
+    """Of a run that the kernel's lock, if there is one, says nothing of."""
+    here = holder.get("host") == socket.gethostname()
+    if not holder or (here and (locked or not _goes_on(holder.get("pid")))):
         return
     with told(path), tempfile.TemporaryFile(dir=path.parent) as now:  # the time of the disk, not of this host
         silent = os.fstat(now.fileno()).st_mtime - path.stat().st_mtime
     if silent < DEAD:
         raise _in_use(path, holder, f"last sign of life {max(silent, 0.0):.0f} s ago; ")
+
+
+def _goes_on(pid: Any) -> bool:
+    """Whether there is such a process on this host, of anybody."""
+    try:
+        os.kill(int(pid), 0)
+    except (ProcessLookupError, TypeError, ValueError):
+        return False
+    except OSError:  # it is another user's
+        return True
+    return True
 
 
 def _in_use(path: Path, holder: dict[str, Any], silent: str = "") -> InputError:
