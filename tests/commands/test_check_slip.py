@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from command_line import call
 from models.pad_beside_ground import KN, KT, MODEL, MU, N0, PAD, K
+
+from fretwave.analyses.parts import at_rest
 
 pytestmark = pytest.mark.ranks(1, 2)
 CASES = Path(__file__).parents[2] / "cases"
@@ -130,3 +133,14 @@ def test_a_mistuned_wheel_slips_in_the_sector_that_moves_most(capfd) -> None:
     first, lasting = slip(said, "tip@0")
     assert first == lasting and re.search(r"pair 0 of 'groove' in sector \d+\)", said)
     assert re.search(rf"first slip expected at level {NUMBER} \({NUMBER} Hz, {NUMBER} m of disk@0, pair 0 of", said)
+
+
+@pytest.mark.ranks(1)
+def test_pairs_that_slip_together_but_for_rounding_are_named_by_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wheel's sectors all slip at once; the one named was another on four ranks."""
+    factors = {"ring": [3.0, 2.0, 2.0 * (1 - 1e-15)], "pads": [2.0 * (1 - 2e-15), 5.0]}
+    monkeypatch.setattr(at_rest, "pair_factors", lambda _, contact, *__: np.tile(factors[contact.name], (2, 1)))
+    contacts = [SimpleNamespace(name=name) for name in factors]
+    states = [{"status": np.full(len(found), at_rest.STICK)} for found in factors.values()]
+    found = at_rest.first_slip(SimpleNamespace(case=SimpleNamespace(contacts=contacts)), states, None, 1.0)
+    assert (found.contact, found.pair, found.amplitude) == ("ring", 1, 2.0)

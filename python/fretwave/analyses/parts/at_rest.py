@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 #: Of a period: they miss the extremes of a harmonic motion by (pi / SAMPLES)^2 / 2 of its amplitude.
 SAMPLES = 256
 
+#: Pairs that slip with the first but for rounding, which is another on other ranks: the first of them is named.
+TIED = 1 + 1e-9
+
 NO_LIMIT = "first slip: no pair sticks at rest with a sharp friction limit"
 
 States = list[dict[str, Array]]
@@ -159,12 +162,13 @@ def first_slip(context: AnalysisContext[Any], states: States, mode: LinearMode, 
         factors = pair_factors(context, contact, state, mode)
         if factors is not None and np.any(state["status"] == STICK):
             first, lasting = unit * factors
-            pair = int(np.argmin(first))
+            pair = int(np.flatnonzero(first <= TIED * np.min(first))[0])
             found.append(FirstSlip(float(first[pair]), contact.name, pair, float(np.min(lasting))))
     if not found:
         return None
     lasting = min(slip.lasting for slip in found)
-    return replace(min(found, key=lambda slip: slip.amplitude), lasting=lasting)
+    least = TIED * min(slip.amplitude for slip in found)
+    return replace(next(slip for slip in found if slip.amplitude <= least), lasting=lasting)
 
 
 def pair_factors(
