@@ -6,6 +6,7 @@ import errno
 import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -79,6 +80,25 @@ def test_hdf5_never_meets_a_failing_write(tmp_path: Path, monkeypatch) -> None:
         file["x"] = np.arange(10000.0)
     with pytest.raises(FileError, match="takes no more"):
         raw.close()
+
+
+@pytest.mark.parametrize("room", [0, 2000, 8000, 20000, 40000, 60000, 80000])
+def test_nothing_is_read_of_what_a_full_disk_has_not_taken(tmp_path: Path, monkeypatch, room: int) -> None:
+    """A line said that damping was 12 % instead of 0.07 %, and a curve was written of it, before the disk's error."""
+    table = writer(tmp_path / "run")
+    fill(table, 9)
+    right = {name: np.asarray(values) for name, values in table.group["points"].items()}
+    table.abandon()
+    table.go_on()
+    with monkeypatch.context() as patch:
+        full_after(patch, room)
+        with suppress(FileError):
+            for name, values in table.group["points"].items():
+                assert np.array_equal(values, right[name]), name
+        with pytest.raises(FileError, match="takes no more"):
+            table.close("done", "")
+            table.publish()
+    table.abandon()
 
 
 def test_a_full_disk_ends_the_command_in_one_message(tmp_path: Path, monkeypatch, capfd) -> None:

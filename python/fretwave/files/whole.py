@@ -274,7 +274,7 @@ def read_through(path: str) -> int:
 class Unfailing:
     """A file for h5py in which no write fails, for HDF5 may crash where one does; the first error is kept.
 
-    ``with h5py.File(Unfailing(path), "w")``; afterwards `close` raises it.
+    ``with h5py.File(Unfailing(path), "w")``; afterwards `close` raises it, and `check` before anything is read.
     """
 
     def __init__(self, path: Path, mode: str = "w+b") -> None:
@@ -316,6 +316,10 @@ class Unfailing:
     def close(self) -> None:
         """Raises FileError where a write failed."""
         self._file.close()
+        self.check()
+
+    def check(self) -> None:
+        """As `close`, of a file that stays open: what is read of it would be none of what was written."""
         if self.error is not None:
             raise file_error(self.error, self.path)
 

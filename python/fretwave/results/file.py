@@ -60,6 +60,17 @@ class NewResults:
         """Put a further array into a group."""
         put_array(self.file[group], name, values, attributes)
 
+    def check(self) -> None:
+        """Before something of it is read.
+
+        Raises
+        ------
+        FileError
+            The disk has not taken what was written.
+        """
+        self.file.flush()
+        self._raw.check()
+
     def publish(self) -> None:
         """Bring it to the disk and put it in the place of the present one.
 

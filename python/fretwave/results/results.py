@@ -98,10 +98,17 @@ class AnalysisWriter:
 
     @property
     def group(self) -> h5py.Group:
-        """The group of the new results.h5 as it will be (on the writing rank, after the last row)."""
+        """The group of the new results.h5 as it will be (on the writing rank, after the last row).
+
+        Raises
+        ------
+        FileError
+            The disk does not take it, and nothing can be read of it.
+        """
         if self._new is None:
             self._new = NewResults(self.folder / "results.h5", self.name)
             build_group(self._new.file, self.name, Rows.of(journal_path(self.folder, self.name)))
+        self._new.check()
         return self._new.file[self.name]
 
     def keep(self, fields: Mapping[str, Field]) -> None:
