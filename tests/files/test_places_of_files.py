@@ -103,3 +103,13 @@ def test_a_place_without_files_is_refused_before_anything_is_solved(
 def test_nothing_is_left_where_it_was_tried(tmp_path: Path) -> None:
     expect_writable(tmp_path / "runs" / "deep")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("target", ["gone", "run"], ids=["gone", "itself"])
+@pytest.mark.parametrize("below", ["", "below"], ids=["the_folder", "one_in_it"])
+def test_a_link_that_leads_nowhere_is_no_folder_for_results(tmp_path: Path, capfd, target: str, below: str) -> None:
+    """It was found when the first point was solved: the file exists, exit 1."""
+    (tmp_path / "run").symlink_to(target)
+    assert call("run", CASE, "--only", "mode", "--out", tmp_path / "run" / below) == 2
+    said = capfd.readouterr()
+    assert "this link leads nowhere" in said.err and f"run -> {target}" in said.err and "asymptotes" not in said.out
