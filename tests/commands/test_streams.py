@@ -46,3 +46,14 @@ def test_a_full_disk_under_what_is_printed_is_one_message(arguments: str) -> Non
 def test_a_message_that_cannot_be_printed_leaves_its_exit_code() -> None:
     for streams in ("2>&-", "2>/dev/full", ">/dev/full 2>/dev/full"):
         assert ended("check nowhere.toml", streams) == (2, "")
+
+
+def test_letters_that_the_output_has_not_are_escaped(tmp_path: Path) -> None:
+    """A title in Greek ended the run at its first line, as a defect of fretwave."""
+    text = CASE.read_text().replace("Two-dof oscillator", "Ω")
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    run = RUN.replace(str(CASE), str(tmp_path / "case.toml"))
+    command = f"PYTHONIOENCODING=ascii exec '{sys.executable}' -m fretwave {run} --out {tmp_path / 'run'}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "") and "\\u03a9" in done.stdout.splitlines()[0]
+    assert "Ω" in (tmp_path / "run" / "run.log").read_text(encoding="utf-8").splitlines()[0]

@@ -11,6 +11,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from io import TextIOWrapper
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
@@ -175,7 +176,10 @@ def _lone_exit(exit_: SystemExit) -> int:
 
 
 def open_streams() -> None:
-    """What a shell has closed (`>&-`) leads nowhere: else the next file to be opened took what is printed."""
+    """What a shell has closed (`>&-`) leads nowhere: else the next file to be opened took what is printed.
+
+    Letters that standard output's encoding has not are escaped there, as they are on standard error.
+    """
     for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         try:
             os.fstat(number)
@@ -184,6 +188,8 @@ def open_streams() -> None:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")  # a title's letter that its encoding has not ended the run
 
 
 def guarded(main: Callable[[], int]) -> int:
