@@ -90,7 +90,8 @@ def describe(error: BaseException, rank: int | None = None, traced: bool = False
     if plain is not None:
         return describe(plain, rank)
     if isinstance(error, KeyboardInterrupt):
-        return "interrupted: finished points are kept; `fretwave resume RUNDIR` goes on from there"
+        kept = ": finished points are kept; `fretwave resume RUNDIR` goes on from there"
+        return f"interrupted{'' if traced else kept}"  # nobody knows what a script keeps
     place = "" if rank is None else f" on rank {rank}"
     text = f"error: {type(error).__name__}{place}: {error}\n"
     if traced or os.environ.get(TRACEBACK):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.observed import Observed, unit_of
 from ..hb.observer import Observer
 from ..kinds import of_their_kinds
+from ..mpi.same import expect_same
 from .branch import Branch
 from .continuation import Continuation, Point
 from .refining import RefiningContinuation
@@ -81,7 +83,7 @@ def follow(
     ------
     InputError
         The range is empty, the start is not in it, or the problem is none of these; a contact has changed since its
-        model was made.
+        model was made; the ranks are given different ends, reports or steps.
 
     Examples
     --------
@@ -108,7 +110,9 @@ def follow(
     first = problem.parameter(start) if own else float(numbers("start", start))
     y0: PETSc.Vec = start if own else problem.initial(first)
     low, high, upwards = _range(first, stop)
-    reports = reports_of(report_at)
+    reports, lengths = reports_of(report_at), astuple(steps or StepControl())
+    asked = [low, high, 0.0 if upwards is None else 2.0 * upwards - 1.0, accuracy or 0.0, errors, unknowns]
+    expect_same(problem.model.comm, "the ends, reports and steps of a branch", [*asked, *lengths, *reports])
     settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": reports, "upwards": upwards}
     if accuracy is None:
         continuation = Continuation(problem, y0, **settings)

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..given import positive
 from ..hb.nonlinear_mode import NonlinearMode
 from ..kinds import of_their_kinds
+from ..mpi.same import expect_same
 from .branch import Branch
 from .follow import reports_of
 from .steps import WearControl
@@ -122,8 +123,8 @@ def wear(
     Raises
     ------
     InputError
-        The branch is of no mode or does not pass the amplitude, a contact cannot wear, a number is not above zero, or
-        the cycles are no number of vibrations.
+        The branch is of no mode or does not pass the amplitude, a contact cannot wear, a number is not above zero, the
+        cycles are no number of vibrations, or the ranks are given different numbers.
     StageFailed
         Newton does not find the start.
     """
@@ -131,7 +132,10 @@ def wear(
     if not isinstance(problem, NonlinearMode):
         what, fix = "the branch is not that of a mode", "follow a fw.NonlinearMode for it"
         raise InputError(what, "wear(branch=...)", repr(problem), "a NonlinearMode", fix)
-    reports, places = reports_of(report_at), branch.at(amplitude=amplitude)
+    reports = reports_of(report_at)
+    asked = [amplitude, coefficient, cycles, cycle_unit or 0.0, -1.0 if errors is None else errors, *reports]
+    expect_same(problem.model.comm, "amplitude, coefficient, cycles and reports of wear", asked)
+    places = branch.at(amplitude=amplitude)
     if not len(places):
         length = branch.units["amplitude"]
         span = f"{branch['amplitude'].min():g} to {branch['amplitude'].max():g} {length}"
