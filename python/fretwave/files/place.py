@@ -34,7 +34,7 @@ def expect_place(path: Path, fix: str) -> None:
         It lies in a file or behind a link that leads nowhere, or a name is longer than any file's can be.
     """
     for parent in path.parents:
-        if parent.is_symlink() and not is_there(parent):
+        if os.path.islink(parent) and not is_there(parent):
             measured = f"{display(parent)} -> {os.readlink(parent)}"
             raise InputError("this link leads nowhere", "--out", measured, "a folder, or a name that is free", fix)
         if is_there(parent) and not parent.is_dir():
