@@ -144,6 +144,7 @@ class Continuation {
   int orientation(Vec y, Vec tangent);
   int orientation(Vec y, Vec tangent, double cosine);
   bool beyond_corner(Trial const&) const;
+  bool straight_there(Trial const&, int sign) const;
   bool leads_back(Trial&);
   std::string oriented(Trial&, double angle);
   std::uint64_t piece(Vec y) { return problem_.piece(y, finely_); }

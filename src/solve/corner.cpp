@@ -40,6 +40,8 @@ const Tuned sparse("branch_sparse", 1.0 / 32,
                    "share of a step: corners farther apart are walked to one by one");
 const Tuned seen_jump("branch_seen_jump", 3e-3,
                       "change of a tangent's forces across the end of a piece, in forces that act: a corner");
+const Tuned lies_back("branch_lies_back", 0.1,
+                      "share of the way to a point behind a corner, by which it may lie back on a tangent");
 const Tuned meets("branch_meets", 0.1, "of the piece behind a corner: by which it may miss the one before");
 
 }  // namespace
@@ -120,6 +122,18 @@ bool Continuation::beyond_corner(Trial const& trial) const {
   return s > 0 && r >= -meets * s && weighted_norm(weights_, chord) <= meets * s * std::sqrt(turned);
 }
 
+/// Whether a trial lies ahead on the anchor's tangent and on its own, which `sign` orients, but for a share of
+/// the way: in all unknowns, the mean among them. Collective.
+bool Continuation::straight_there(Trial const& trial, int sign) const {
+  const VecHandle chord = moved(trial.y, -1, anchor_.y);
+  Vec first = anchor_.tangent, second = trial.tangent;
+  const double a = dot(first, first), b = dot(first, second), c = dot(second, second), p = dot(first, chord),
+               q = dot(second, chord), turned = a * c - b * b, slack = lies_back * norm(chord);
+  if (!(turned > no_corner * a * c)) return p >= 0;
+  const double along_first = (c * p - b * q) / turned, along = (a * q - b * p) / turned;
+  return along_first * std::sqrt(a) >= -slack && sign * along * std::sqrt(c) >= -slack;
+}
+
 /// Whether a trial's tangent runs against the branch: an older piece of it, or another branch, as a sheet
 /// that begins beside it. Asked of small systems, where a determinant costs less than a Newton step. A branch
 /// point looks the same: it is passed in a step of `kink_length`, of which this is not asked.
@@ -141,7 +155,8 @@ std::string Continuation::oriented(Trial& trial, double angle) {
   const int sign = beyond_corner(trial) && !touched ? 1 : orientation(trial.y, trial.tangent);
   if (sign < 0 && touched && (angle < kink_angle || just_touched()))
     return "the corrector lands on another branch";
-  if (sign > 0 && fell_back(trial)) return "the corrector lands on another branch";
+  if ((sign && !touched && !straight_there(trial, sign)) || (sign > 0 && fell_back(trial)))
+    return "the corrector lands on another branch";
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
   if (sign < 0) {
     check(VecScale(trial.tangent, -1));

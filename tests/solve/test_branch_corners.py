@@ -152,7 +152,8 @@ def test_a_branch_point_where_nothing_changes_its_state_is_passed(comm, maximum)
 @pytest.mark.ranks(1)
 def test_a_branch_that_goes_round_in_circles_ends(comm):
     """Without what shows which way it goes on: by the same points in each round, and where these are not looked at."""
-    with options(fw_branch_meets=1e-300, fw_branch_surely_in=1e300, fw_branch_certain=1e9, fw_branch_walk=0.1):
+    away = {"fw_branch_meets": 1e-300, "fw_branch_surely_in": 1e300, "fw_branch_certain": 1e9}
+    with options(**away, fw_branch_walk=0.1, fw_branch_lies_back=1e300):
         branches = [zigzag(comm, maximum) for maximum in (0.0657, 0.0957)]
         with options(fw_branch_again=1e-300):
             branches.append(zigzag(comm, 0.0657))
