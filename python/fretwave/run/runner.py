@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +20,8 @@ from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.log import event
-from ..mpi.petsc_options import AnalysisOptions, said_unread, unread_outside
-from ..mpi.petsc_share import REDUCTION, TIME, UNREAD, RunWide, choosing, kind_of, prefix_of
-from ..mpi.petsc_values import parse
+from ..mpi.petsc_options import AnalysisOptions
+from ..mpi.petsc_share import TIME, UNREAD, RunWide, prefix_of
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
 from ..results.journal import Journal
@@ -34,6 +32,8 @@ from .left_out import left_out_lines
 from .order import RunOptions, in_order
 from .pictures import plot
 from .stopped import joined, not_converged, without
+from .unread import UnreadOptions
+from .wide import check_in_time, run_wide
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -102,11 +102,7 @@ class Runner:
         self.console = Console(active, self.folder.log, shown=Shown.NOTHING if part else options.shown)
         self.part, self.clock, self.wide = part, clock or Estimate(), RunWide()
         self.failures: list[NotConverged] = []
-        #: PETSc options that something has read.
-        self.read: set[str] = set()
-        #: What nothing has read in any value of a sweep, sweep by sweep, and lines about that of single analyses.
-        self._unread_in_sweeps: list[Sequence[str]] = []
-        self._unread_lines: list[str] = []
+        self.unread = UnreadOptions()
         self._basis: Callable[[], None] = _nothing
         if resuming:
             on_first_rank(comm, self._check_readable)
@@ -140,14 +136,8 @@ class Runner:
         on_first_rank(self.comm, lambda: checks.check_chosen([self.case.analyses[name] for name in names], self.case))
         sweeps = check_sweeps(self.case, names, self.options, self.comm)
         self.folder.record["selected"] = names
-        self.wide = RunWide(
-            parse(self.options.petsc),
-            {prefix_of(name): kind_of(self.case.analyses[name]) for name in names},
-            [prefix_of(name) for name in self.case.analyses if name not in names],
-            {prefix_of(name): self._choosing(self.case.analyses[name]) for name in names},
-            self.read,
-        )
-        self._check_in_time(names)
+        self.wide = run_wide(self.case, names, self.options.petsc, self.unread.read)
+        check_in_time(self.case, names, self.wide)
         self._greet(names)
         self._reduce([name for name in names if name not in sweeps])
         try:
@@ -161,18 +151,6 @@ class Runner:
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
         return EXIT_DONE
-
-    def _check_in_time(self, names: Sequence[str]) -> None:
-        """Names of options of time integrations, before anything is solved. Collective."""
-        for analysis in (self.case.analyses[name] for name in names):
-            if analysis.integrates():
-                options = AnalysisOptions(prefix_of(analysis.name), [analysis.petsc], self.wide)
-                options.check_in_time(f"analysis '{analysis.name}'", analysis.integrates() == "type")
-
-    def _choosing(self, analysis: AnalysisSection) -> dict[str, str | None]:
-        """Options of an analysis alone that choose its solvers."""
-        known = [prefix_of(name) for name in self.case.analyses]
-        return choosing(parse(self.options.petsc), parse(analysis.petsc), prefix_of(analysis.name), known)
 
     def _run_all(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
         for number, name in enumerate(names, 1):
@@ -212,26 +190,12 @@ class Runner:
         """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
         at = None if self.case.reduction is None else self.case.reduction.error_at
         asked = at is not None and any(self.case.analyses[name].passes(at) for name in names)
-        with self._steering_reduction():
+        with self.unread.steering_reduction(self.wide, self.case.reduction is not None):
             self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=asked, only=names)
         if self.case.reduced is not None:
             for line in self.case.reduced.lines():
                 self.console.line(line)
             self.folder.record["reduction"] = self.case.reduced.plain()
-
-    @contextmanager
-    def _steering_reduction(self) -> Iterator[None]:
-        """Its PETSc options are in the database inside."""
-        from .. import _core
-
-        given = self.wide.reduction()
-        if self.case.reduction is None and not given:
-            yield
-            return
-        options = AnalysisOptions(REDUCTION, [], RunWide(given))
-        with options.inserted():
-            yield
-            self.read |= options.read(_core.unused_options)
 
     def _keep_basis(self, reduction: Reduction | SectorReduction) -> None:
         """For `fretwave view`: of a model with nodes, and not of the runs of a sweep. Collective."""
@@ -259,16 +223,13 @@ class Runner:
         """Analyses whose results another needs: of this run, or kept in the folder."""
         for name in names:
             for needed in self.case.analyses[name].needs():
-                if needed not in names and not self._kept(needed):
+                if needed not in names and not has_analysis(self.folder.path, self.case, needed):
                     raise InputError(
                         f"'{name}' needs the results of '{needed}'",
                         where="--only",
                         measured=f"no results of '{needed}' for this case in {display(self.folder.path)}",
                         fix=f"--only {needed},{name}",
                     )
-
-    def _kept(self, name: str) -> bool:
-        return has_analysis(self.folder.path, self.case, name)
 
     def _status(self, name: str) -> str | None:
         """Of what this run has of an analysis in its results, None for nothing. One rank only."""
@@ -333,13 +294,11 @@ class Runner:
             except NotConverged as error:  # before its first point: there was no static state to start from
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
-            unread = options.unread(_core.unused_options)
-            self.read |= options.read(_core.unused_options)
+            unread = self.unread.of_analysis(options)
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
         if unread and outcome.points:
-            self._unread_lines.append(f"{analysis.name}: {unread}")
-            self.console.line(self._unread_lines[-1])
+            self.console.line(self.unread.line(analysis.name, unread))
         if outcome.points and not self.part:
             with event("FwCurve"):
                 context.write_curves()
@@ -355,7 +314,7 @@ class Runner:
         self._note(name, outcome, time.perf_counter() - began)
         run_id, elsewhere = self.folder.record["run_id"], dict(self.wide.pairs)
         names, lines = on_first_rank(self.comm, lambda: sweep.unread(run_id, elsewhere))
-        self._unread_in_sweeps.append(names)
+        self.unread.in_sweeps.append(names)
         for line in lines:
             self.console.line(f"{name}: {line}")
 
@@ -387,18 +346,10 @@ class Runner:
             self.console.line(line)
 
     def _say_unread(self) -> None:
-        """Options without effect: those of the whole run that no analysis has read, those of the environment."""
-        from .. import _core
-
-        idle = [name for name in self.wide.of_all() if name not in self.read]
-        idle = [name for name in idle if all(name in names for names in self._unread_in_sweeps)]
         if self.part and not self.resuming:
-            self.folder.record[UNREAD] = {"names": idle, "lines": self._unread_lines}
-        if idle and not self.resuming and not self.part:
-            self.console.line(f"note: {said_unread(idle)}")
-        unread = unread_outside(_core.unused_options(), self.wide)
-        if unread:
-            self.console.line(f"note: {unread}")
+            self.folder.record[UNREAD] = self.unread.plain(self.wide)
+        for note in self.unread.notes(self.wide, of_run=not self.part and not self.resuming):
+            self.console.line(note)
 
     def _finish(self) -> None:
         self.folder.record["status"] = "stopped" if self.failures else "done"
