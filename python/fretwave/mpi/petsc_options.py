@@ -181,9 +181,13 @@ class AnalysisOptions:
 
     def unread(self, unused: Callable[[], Sequence[str]]) -> str:
         """Says at the end which options no solver has read; empty where all were, or may be by other analyses."""
+        return said_unread(self.without_effect(unused))
+
+    def without_effect(self, unused: Callable[[], Sequence[str]]) -> list[str]:
+        """Names, without the prefix, of options that no solver has read and that are for no other analysis."""
         own = {name for name in self.pairs if SHARED.match(name)} - {name for name, _ in self.wide.pairs}
         left = [name for name in self._unread(unused) if name in own or not self.wide.left_to_others(self.prefix, name)]
-        return said_unread([self._plain(name) for name in left])
+        return [self._plain(name) for name in left]
 
     def read(self, unused: Callable[[], Sequence[str]]) -> set[str]:
         """Names, as they were given, of what solvers have read here."""

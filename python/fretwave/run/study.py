@@ -16,7 +16,7 @@ from ..mpi.guard import on_first_rank
 from ..results.runfolder import read_copy
 from ..results.study_report import LEGEND, LEGEND_OF_RESPONSE, PRINTED, PRINTED_OF_RESPONSE, markdown
 from .stopped import advice
-from .study_folder import StudyFolder, publish
+from .study_folder import StudyFolder, publish, say_unread
 from .study_input import check_options, plan_of
 from .study_plan import Settings, Study
 from .study_solver import ModeSolver, ResponseSolver, Solver, Studied
@@ -77,6 +77,7 @@ def _study_branch(
         lambda sweep, settings: console.line(_progress(study, sweep, settings)),
     )
     _check_reference(study, analysis)
+    say_unread(solver.unread, case, analysis.name, folder, console)
     tables = {"study": study.table(), "calibration": study.calibration()}
     text = markdown(tables["study"], _notes(study), *PRINTED_AS[study.over])
     folder.finish(lambda path: publish(path, tables, text, console))

@@ -18,6 +18,7 @@ from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, results_folder
 from ..texts import display
+from .unread import UnreadInStudy
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -51,7 +52,7 @@ class StudyFolder:
         record: dict[str, Any] | None = None,
     ) -> None:
         self.path, self.comm = results_folder(options.out, f"{case.name}_study", comm), comm
-        resumed = record is not None
+        self.resumed = record is not None
         if record is None:
             told = {"overrides": options.overrides, "quick": options.quick, "only": [], "petsc": ""}
             given = {"path": str(case.path.resolve()), **told, "digest": case.digest, "resolved": case.resolved}
@@ -61,7 +62,7 @@ class StudyFolder:
             _check_unchanged(self.path, case, record)
         record.update(status="running", ranks=comm.size)
         self.record = record
-        self._folder = RunFolder(self.path, record, case.text, comm.rank == 0, resumed, options.force)
+        self._folder = RunFolder(self.path, record, case.text, comm.rank == 0, self.resumed, options.force)
         self._kept = Kept(self.path / ".runs", str(record["run_id"]))
         on_first_rank(comm, self._folder.check_free)
 
@@ -121,6 +122,12 @@ def publish(folder: Path, tables: Mapping[str, Sequence[Mapping[str, Any]]], tex
         console.line(line)
     first, *others = (folder / f"{name}.csv" for name in tables)
     console.line(f"written: {', '.join(str(path) for path in (first, folder / 'study.md', *others, *pictures))}")
+
+
+def say_unread(unread: UnreadInStudy, case: Case, name: str, folder: StudyFolder, console: Console) -> None:
+    """PETSc options without effect, once for all runs; of runs that were kept nothing is known."""
+    for note in () if folder.resumed else unread.notes(case, name):
+        console.line(note)
 
 
 def _check_unchanged(path: Path, case: Case, record: dict[str, Any]) -> None:

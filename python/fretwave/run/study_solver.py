@@ -27,8 +27,10 @@ from ..case.wheel import on_wheel, solver_room
 from ..columns import SOURCES
 from ..console import Console
 from ..mpi.petsc_options import AnalysisOptions
+from ..mpi.petsc_share import prefix_of
 from .study_outcomes import AnyOutcome, Outcome, ResponseOutcome
 from .study_plan import Settings, common_amplitudes
+from .unread import UnreadInStudy
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -55,9 +57,10 @@ class Solver(ABC, Generic[Begun]):
         self, case: Case, analysis: Studied, comm: MPI.Comm, console: Console, repeats: int, places: int
     ) -> None:
         self.case, self.analysis, self.comm, self.console, self.repeats = case, analysis, comm, console, repeats
-        self.prefix = f"{analysis.name}_"
+        self.prefix, self.unread = prefix_of(analysis.name), UnreadInStudy()
         self.places = self._places(places)
-        self._parts: tuple[int | None, AnalysisContext[Any], Begun] | None = None
+        self._parts: tuple[int | None, AnalysisContext[Any]] | None = None
+        self._begun: Begun | None = None
 
     @abstractmethod
     def _ends(self) -> tuple[float, float]:
@@ -79,8 +82,8 @@ class Solver(ABC, Generic[Begun]):
     def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> AnyOutcome:
         """Of the points' rows (`_row`)."""
 
-    def _model(self, component_modes: int | None) -> tuple[AnalysisContext[Any], Begun]:
-        """Context and start with this many component modes; the last one is kept. Collective."""
+    def _model(self, component_modes: int | None) -> AnalysisContext[Any]:
+        """Context with this many component modes; the last one is kept. Collective."""
         if self._parts is None or self._parts[0] != component_modes:
             if self._parts is not None:
                 self._parts[1].model.destroy()
@@ -90,8 +93,8 @@ class Solver(ABC, Generic[Begun]):
             preload, diameters = case.preload_of(analysis), nodal_diameter(analysis)
             model = build_model(case, analysis.dampers, self.comm, preload, diameters, analysis.aerodynamics)
             context = AnalysisContext(model, case, analysis, self.comm, Path(), self.console)
-            self._parts = (component_modes, context, self._started(context))
-        return self._parts[1:]
+            self._parts, self._begun = (component_modes, context), None
+        return self._parts[1]
 
     def solve(self, settings: Settings) -> AnyOutcome | str:
         """The branch's values where runs are compared, or why it has none. Collective."""
@@ -105,17 +108,19 @@ class Solver(ABC, Generic[Begun]):
         return replace(first, wall_s=min(run.wall_s for run in runs), cpu_s=min(run.cpu_s for run in runs))
 
     def _once(self, settings: Settings) -> AnyOutcome | str:
-        context, started = self._model(settings.component_modes)
+        context = self._model(settings.component_modes)
         asked = settings.accuracy is not None
         least = (LEAST_HARMONICS, LEAST_SAMPLES) if asked else (settings.harmonics, settings.samples)
         harmonics = retained(context, *least)
         options = AnalysisOptions(self.prefix, [self.analysis.petsc, f"-snes_atol {settings.tolerance!r}"])
         with options.inserted(), solver_room(context.case, self.analysis, self.prefix):
-            problem = self._problem(context, started, harmonics)
+            self._begun = self._begun or self._started(context)
+            problem = self._problem(context, self._begun, harmonics)
             try:
                 return self._follow(problem, settings.accuracy)
             finally:
                 problem.destroy()
+                self.unread.after_run(options)
 
     def _follow(self, problem: HarmonicProblem, accuracy: float | None) -> AnyOutcome | str:
         """Only the time spent between points counts: diagnostics are not part of the solution.

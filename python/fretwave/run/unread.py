@@ -1,4 +1,4 @@
-"""PETSc options that nothing in a run has read: of its analyses, of the values of its sweeps, of the environment."""
+"""PETSc options that nothing in a run or a study has read: of analyses, of values of sweeps, of the environment."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from ..case.load import Case
 from ..mpi.petsc_options import AnalysisOptions, said_unread, unread_outside
 from ..mpi.petsc_share import REDUCTION, RunWide
+from .wide import run_wide
 
 
 @dataclass
@@ -65,7 +67,29 @@ class UnreadOptions:
 
     def notes(self, wide: RunWide, of_run: bool) -> Iterator[str]:
         """Options without effect: those of the whole run, if it tells of them, and those of the environment."""
+        yield from _notes(self.idle(wide) if of_run else [], wide)
+
+
+@dataclass
+class UnreadInStudy:
+    """What none of a study's runs has read; all of them have the same options."""
+
+    names: list[str] | None = None
+
+    def after_run(self, options: AnalysisOptions) -> None:
+        """At the end of a run, with its options still in the database."""
         from .. import _core
 
-        texts = (said_unread(self.idle(wide)) if of_run else "", unread_outside(_core.unused_options(), wide))
-        yield from (f"note: {text}" for text in texts if text)
+        left = options.without_effect(_core.unused_options)
+        self.names = left if self.names is None else [name for name in self.names if name in left]
+
+    def notes(self, case: Case, name: str) -> Iterator[str]:
+        """Options without effect on the study of an analysis, and those of the environment."""
+        yield from _notes(self.names or [], run_wide(case, [name]))
+
+
+def _notes(names: Sequence[str], wide: RunWide) -> Iterator[str]:
+    from .. import _core
+
+    texts = (said_unread(names), unread_outside(_core.unused_options(), wide))
+    yield from (f"note: {text}" for text in texts if text)

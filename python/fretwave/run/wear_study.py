@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +29,8 @@ from ..mpi.guard import caught_by_all
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
 from ..units import SI, UnitSystem
-from .study_folder import StudyFolder, publish
+from .study_folder import StudyFolder, publish, say_unread
+from .unread import UnreadInStudy
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -176,6 +178,7 @@ def study_wear(case: Case, options: argparse.Namespace, comm: MPI.Comm, console:
         reasons = "; ".join(dict.fromkeys(plan.failures.values()))
         fix = f"milder finest settings, or {march_advice(analysis.name, reasons)}"
         raise NotConverged("no sweep has its finest run", None, reasons, "a finished march", fix)
+    say_unread(solver.unread, case, analysis.name, folder, console)
     folder.finish(lambda path: _write(plan, amplitude, analysis, path, console))
     return EXIT_DONE
 
@@ -206,6 +209,7 @@ class _Solver:
         self.comm, self.console, self.repeats = comm, console, repeats
         self.model = model_of(self.case, self.analysis, comm)
         self._starts: dict[int, dict[str, Any]] = {}
+        self.unread = UnreadInStudy()
         self.unit = 0.0  # of the first run, so that all compare at the same cycles
 
     def _mode(self, harmonics: int | None) -> ModeAnalysis:
@@ -219,13 +223,21 @@ class _Solver:
     def _context(self, mode: ModeAnalysis) -> AnalysisContext[ModeAnalysis]:
         return AnalysisContext(self.model, self.case, mode, self.comm, Path(), Console(False))
 
+    @contextmanager
+    def _steering(self, context: AnalysisContext[ModeAnalysis]) -> Iterator[None]:
+        """The PETSc options of the analysis, as a run has them, are in the database inside."""
+        options = AnalysisOptions(context.prefix, [self.analysis.petsc])
+        with options.inserted():
+            yield
+            self.unread.after_run(options)
+
     def cycle_unit(self, settings: WearSettings) -> CycleUnit | str:
         """Vibrations in a normalised cycle, or why they are not known."""
         if self.analysis.cycle_unit:
             return CycleUnit(self.analysis.cycle_unit)
         mode = self._mode(settings.harmonics)
         context = self._context(mode)
-        with AnalysisOptions(context.prefix, [mode.petsc]).inserted():
+        with self._steering(context):
             try:
                 self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
             except (NotConverged, PetscError) as error:
@@ -236,7 +248,7 @@ class _Solver:
         """Values at the compared cycles, or why there are none; its time is that of the fastest march."""
         mode = self._mode(settings.harmonics)
         context = self._context(mode)
-        with AnalysisOptions(context.prefix, [mode.petsc]).inserted():
+        with self._steering(context):
             try:
                 if settings.harmonics not in self._starts:
                     self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
