@@ -79,6 +79,18 @@ def test_a_misspelt_one_of_a_time_integration_is_refused_before_anything_is_solv
     assert "fix:" in said
 
 
+@pytest.mark.parametrize(("name", "option"), [("free_decay", "ts_rtoll"), ("forced", "time_ts_rtoll")])
+def test_check_says_the_same_of_those_of_a_case(tmp_path: Path, capfd, name: str, option: str) -> None:
+    """It called a case right that no run began with."""
+    (tmp_path / "case.toml").write_text(as_toml(bases.two_dof()), encoding="utf-8")
+    given = ["--set", "forced.time_points=1", "--set", f"{name}.petsc='-{option} 1e-9'"]
+    assert call("check", tmp_path / "case.toml", *given) == 2
+    said = capfd.readouterr()
+    assert f"no solver reads the PETSc option -{option}\n" in said.err and "no errors" not in said.out
+    right = [word.replace("rtoll", "rtol") for word in given]
+    assert call("check", tmp_path / "case.toml", "--only", name, *right) == 0
+
+
 @pytest.mark.parametrize(
     "petsc", ["-ts_rtol 1e-9", "-ts_type bdf -ts_bdf_order 3", "-ts_adapt_type dsp -ts_adapt_dsp_filter h211b"]
 )

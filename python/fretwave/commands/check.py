@@ -19,6 +19,7 @@ from ..run.at_rest import at_rest
 from ..run.order import RunOptions, in_order
 from ..run.runner import check_sweeps
 from ..run.stopped import joined
+from ..run.wide import check_in_time, run_wide
 from ..texts import counted, display
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def check_case(
     names = in_order(case, checks.choose(list(case.analyses), only))
     on_first_rank(comm, lambda: checks.check_chosen([case.analyses[name] for name in names], case))
     check_sweeps(case, names, RunOptions(overrides=list(overrides), quick=quick), comm)
+    check_in_time(case, names, run_wide(case, names))
     warnings = odd_ratios(case)
     case = reduce_case(case, comm, only=names)
     with build_model(case, (), comm) as model:
