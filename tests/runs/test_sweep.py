@@ -282,7 +282,7 @@ def test_killed_sweep_goes_on_with_the_values_not_done(case: Path, swept: Path, 
     assert not (tmp_path / "results.h5").exists()
     done = launch(2, "-m", "fretwave", "resume", str(tmp_path), "--no-plots", timeout=120)
     assert done.returncode == 0, done.stderr
-    assert "friction_limit = 0.2: already done" in done.stdout
+    assert "friction_limit = 0.2 N: already done" in done.stdout
     assert (tmp_path / "values" / "0000" / "results.h5").read_bytes() == first
     for key in ("value", "point", "zeta"):
         one, other = (column(folder / "mode.csv", key) for folder in (swept, tmp_path))

@@ -46,7 +46,7 @@ def test_amplitudes_of_other_units_stand_in_columns_of_their_own(case: Path, tmp
     columns = {"mode": ("slip_threshold [mm]", 1.0), "modal": ("slip_threshold [sqrt(t) mm]", 2.0)}
     for row in rows(tmp_path / "run" / "summary.csv"):
         own, factor = columns.pop(row["analysis"]) if row["value"] == "1" else columns[row["analysis"]]
-        limit = float(row["contact.slider.friction_limit"])
+        limit = float(row["contact.slider.friction_limit [N]"])
         assert float(row[own]) == pytest.approx(factor * limit, rel=0.5 * (np.pi / 512) ** 2)
         assert [row[name] for name in row if "slip_threshold" in name and name != own] == [""]
     assert not columns
@@ -156,7 +156,7 @@ def test_a_sweep_from_slip_to_stick(case: Path, tmp_path: Path, capsys) -> None:
     slips, sticks = rows(tmp_path / "run" / "summary.csv")
     assert 0.5 < float(slips["onset_amplitude"]) < float(slips["amplitude_of_largest_zeta"]) < 3.0
     assert [sticks[name] for name in OF_AMPLITUDE] == ["nan"] * len(OF_AMPLITUDE)
-    assert "friction_limit = 100.0: slip from 100 m, zeta 0 % throughout" in capsys.readouterr().out
+    assert "friction_limit = 100.0 N: slip from 100 m, zeta 0 % throughout" in capsys.readouterr().out
 
 
 def test_a_sweep_of_branches_that_have_no_such_amplitude_has_its_picture(case: Path, tmp_path: Path, capsys) -> None:

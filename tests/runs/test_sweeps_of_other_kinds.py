@@ -82,14 +82,14 @@ def test_linear_frequencies_in_closed_form(tmp_path: Path, capsys) -> None:
     assert column(run / "summary.csv", "hz_stuck_1") == pytest.approx(np.sqrt(1 + stiffness) / (2 * np.pi), rel=SOLVED)
     assert column(run / "summary.csv", "hz_free_1") == pytest.approx(1 / (2 * np.pi), rel=SOLVED)
     assert (
-        "linear: tangential_stiffness = 3.0: stuck 1 mode 0.31831 Hz, free 1 mode 0.159155 Hz"
+        "linear: tangential_stiffness = 3.0 N/m: stuck 1 mode 0.31831 Hz, free 1 mode 0.159155 Hz"
         in capsys.readouterr().out
     )
     with rewritten(run / "results.h5", "none") as file:  # as an earlier version wrote it
         for name in ("hz_stuck_1", "hz_free_1"):
             del file[f"linear/summary/{name}"]
     assert call("show", run) == 0
-    assert "linear: tangential_stiffness = 3.0: 2 points" in capsys.readouterr().out
+    assert "linear: tangential_stiffness = 3.0 N/m: 2 points" in capsys.readouterr().out
 
 
 def test_values_with_fewer_modes_than_others_are_shown_as_they_were_told(tmp_path: Path, capsys) -> None:
@@ -125,7 +125,7 @@ def test_wear_by_amplitude(tmp_path: Path, capsys) -> None:
             assert column(summary, "worn_volume", **found)[0] == pytest.approx(volume, rel=REPEATED)
             assert (volume > 0) == (line > 0)  # the first amplitude does not slip
     shown = capsys.readouterr().out
-    assert "wear: coefficient = 2e-13, line 2: a = 3e-06 m: zeta" in shown and "after 8 cycles" in shown
+    assert "wear: coefficient = 2e-13 1/Pa, line 2: a = 3e-06 m: zeta" in shown and "after 8 cycles" in shown
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ def test_states_at_rest(tmp_path: Path, capsys) -> None:
     assert column(run / "summary.csv", "smallest_normal_force") == pytest.approx([1.0, 2.5], rel=SOLVED)
     assert column(run / "summary.csv", "normal_force") == pytest.approx([1.0, 2.5], rel=SOLVED)
     assert column(run / "summary.csv", "open_share").tolist() == [0.0, 0.0]
-    assert "rest: normal_load = 2.5, factor 1: 0 % of the pairs slip, 0 % are open" in capsys.readouterr().out
+    assert "rest: normal_load = 2.5 N, factor 1: 0 % of the pairs slip, 0 % are open" in capsys.readouterr().out
 
 
 def test_factors_that_are_solved_came_to_their_end(tmp_path: Path) -> None:
@@ -178,7 +178,7 @@ def test_decays_by_start(tmp_path: Path, capsys) -> None:
     assert half == pytest.approx(2 * np.log(2.0) / np.array([c, c, 2 * c, 2 * c]), rel=1e-5)
     zeta = column(run / "summary.csv", "largest_zeta", analysis="decay")
     assert zeta == pytest.approx(np.array([c, c, 2 * c, 2 * c]) / 2, rel=1e-4)
-    assert "decay: C = [[0.04]], start 1: half of it after 34.65" in capsys.readouterr().out
+    assert "decay: C = [[0.04]] N s/m, start 1: half of it after 34.65" in capsys.readouterr().out
 
 
 def test_damping_is_that_of_cycles_between_others(tmp_path: Path, capsys) -> None:
@@ -237,7 +237,7 @@ def test_limit_cycles_by_start(tmp_path: Path, capsys) -> None:
     last = column(run / "summary.csv", "last_amplitude", **own)
     unstable = 4 * np.array([0.05, 0.05, 0.052, 0.052]) / (np.pi * 0.01)
     assert np.array_equal(last > unstable, [False, True, False, True])
-    assert "ends: friction_limit = 0.052, start 1: no limit cycle" in capsys.readouterr().out
+    assert "ends: friction_limit = 0.052 N, start 1: no limit cycle" in capsys.readouterr().out
 
 
 def test_of_many_modes_the_lowest_are_told_and_where_the_others_stand(tmp_path: Path, capsys) -> None:

@@ -17,7 +17,7 @@ from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
 from ..results.file import OVERRIDES
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, results_folder
-from ..results.sweeps import summary_columns, summary_lines, write_sweep
+from ..results.sweeps import key_headings, summary_columns, summary_lines, system_of, write_sweep
 from ..run.order import RunOptions
 from ..run.pictures import plot
 from ..run.runner import Runner
@@ -126,7 +126,7 @@ def _write(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """One group, one table for each analysis, one summary of all; lines to print. One rank only."""
     run_id = folder.record["run_id"]
-    outcomes, summary, lines = sweep.outcomes(run_id, errors), [], list[str]()
+    outcomes, summary, lines, keys = sweep.outcomes(run_id, errors), [], list[str](), dict[str, str]()
     for name in first.analyses:
         branches, rows = sweep.branches(name, run_id), list[dict[str, Any]]()
         if branches:
@@ -136,10 +136,12 @@ def _write(
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             columns = summary_columns(str(branches[0].attributes["type"]), branches, rows)
             headings = {column.name: column.heading for column in columns}  # their units may differ by analysis
+            keys = key_headings(sweep.plan, system_of(branches))
+            headings |= keys
             summary += [{"analysis": name, **{headings.get(key, key): row[key] for key in row}} for row in rows]
         lines += summary_lines(name, sweep.plan, branches, rows)
     if summary:
-        lead = [*sweep.plan.keys, "value", "analysis"]
+        lead = [*keys.values(), "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]
         write_rows(folder.path / "summary.csv", ordered)
     sweep.forget_others()

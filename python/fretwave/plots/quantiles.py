@@ -19,7 +19,7 @@ from ..results.reader import Run
 from ..results.sweep_quantiles import AMPLITUDE_AT, groups_of, over_seeds, range_text
 from ..results.sweep_summary import COUNTS, columns_in, spread_of, summary_of
 from . import style
-from .swept import Swept
+from .swept import Swept, plan_in
 
 #: Panels of a picture.
 MOST = 6
@@ -32,7 +32,7 @@ SAME = 1e-9
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     """One picture per sweep over seeds."""
     for analysis in run.of_kind("sweep"):
-        plan, kind = Plan(analysis.attributes["over"]), str(analysis.attributes["of_type"])
+        plan, kind = plan_in(analysis), str(analysis.attributes["of_type"])
         if over_seeds(plan) and len(plan) >= LEAST and summary_of(kind) is not COUNTS:
             swept = Swept.of(analysis)
             shown = columns_of(swept)
@@ -102,7 +102,7 @@ def samples(swept: Swept, name: str) -> list[tuple[str, Array]]:
 
 
 def _named(swept: Swept, others: dict[str, Any], part: int, count: int) -> str:
-    words = Plan({key: [value] for key, value in others.items()}).labels() if others else []
+    words = Plan({key: [value] for key, value in others.items()}, swept.plan.units).labels() if others else []
     words += [f"{swept.split.replace('_', ' ')} {swept.parts[part]:g}"] if len(swept.parts) > 1 else []
     return ", ".join([*words, f"{count} draws"])
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ..arrays import Array
-from ..post.grid import Plan, short_names
+from ..post.grid import Plan
 from ..post.limit_cycles import SHORT
 from ..results.analysis import Table
 from ..results.sweep_summary import CYCLES
@@ -105,7 +105,7 @@ def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
             draw(plane, x[order], {name: data[:, number] for name, data in lines.items()}, number)
         scale = _rescaled(plane, swept, unit) if unit == "length" else Scale(1.0, unit)
         plane.set_ylabel(scale.label(text))
-        plane.set_xlabel(short_names(swept.plan.keys)[key].replace("_", " "))
+        plane.set_xlabel(swept.plan.headings()[key])
         _scales(plane, x[order], [] if numeric else [tick(values[k]) for k in order], from_zero)
     for number, name in enumerate(others if len(others) > 1 else ()):
         colour = style.GREY if panels[-1] is MODE_PANELS[-1] else style.PALETTE[number % len(style.PALETTE)]
@@ -129,7 +129,7 @@ def _others(swept: Swept) -> list[str]:
     over = {key: values for key, values in swept.plan.over.items() if key != swept.plan.keys[swept.main]}
     if swept.parts:
         over[swept.split] = swept.parts
-    return Plan(over).labels() if over else [""]
+    return Plan(over, swept.plan.units).labels() if over else [""]
 
 
 def _scales(axes: Axes, x: Array, texts: list[str], from_zero: bool) -> None:

@@ -11,7 +11,6 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
 from ..arrays import Array
-from ..post.grid import short_names
 from ..results.analysis import Table
 from ..results.reader import Run
 from ..results.sweep_quantiles import is_seed
@@ -134,4 +133,4 @@ def _name(figure: Figure, axes: list[Axes], swept: Swept, name_error: Callable[[
     shown = np.unique(np.linspace(0, len(swept.plan) - 1, NAMED).astype(int))
     values = [", ".join(map(tick, combination.values())) for combination in swept.plan.values()]
     bar.set_ticks(shown, labels=[values[number] for number in shown])
-    bar.set_label(", ".join(short_names(swept.plan.keys).values()).replace("_", " "))
+    bar.set_label(", ".join(swept.plan.headings().values()))

@@ -49,7 +49,7 @@ class Swept:
             names = [*names_of_data(group), *([split] if split in group else [])]
             summary = {key: np.asarray(group[key][()], dtype=float) for key in names}
         parts = [float(part) for part in summary.pop(split, ())]
-        plan = Plan(analysis.attributes["over"])
+        plan = plan_in(analysis)
         branches = [] if analysis.meaning is None else list(_branches(analysis.curve(), len(plan), split, parts))
         return cls(analysis, plan, branches, summary, split, parts)
 
@@ -88,12 +88,18 @@ class Swept:
         entries = []
         for key in (self.main, 1 - self.main):
             name = self.plan.keys[key]
-            for k, label in enumerate(Plan({name: self.plan.over[name]}).labels()):
+            for k, label in enumerate(Plan({name: self.plan.over[name]}, self.plan.units).labels()):
                 place = [k if other == key else 0 for other in (0, 1)]
                 look = self.look(int(np.ravel_multi_index(place, self.plan.shape)))
                 changed = {"linestyle": "-"} if key == self.main else {"color": style.GREY}
                 entries.append((label, {**look, **changed}))
         return entries
+
+
+def plan_in(analysis: Analysis) -> Plan:
+    """Of a sweep, with the units of its keys."""
+    over = analysis.attributes["over"]
+    return Plan(over, {key: style.symbol(analysis.unit(key)) for key in over})
 
 
 def _branches(curve: Reading, values: int, split: str, parts: list[float]) -> Iterator[tuple[int, int, Table]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from math import prod
@@ -23,9 +23,12 @@ class Plan:
     ----------
     over : dict
         Values by key; keys are addressed as ``--set`` does.
+    units : dict
+        Symbols by key, of keys that have a quantity.
     """
 
     over: Mapping[str, Sequence[Any]]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return prod(self.shape)
@@ -52,16 +55,24 @@ class Plan:
         """Each combination in a few words, by the last parts of the keys."""
         return self._labels
 
+    def headings(self) -> dict[str, str]:
+        """The last parts of the keys with their units, as an axis has them."""
+        units = {key: f" [{self.units[key]}]" if self.units.get(key) else "" for key in self.keys}
+        return {key: name.replace("_", " ") + units[key] for key, name in short_names(self.keys).items()}
+
     @cached_property
     def _overrides(self) -> list[list[str]]:
         """Written once: every value of a sweep asks for its own."""
         return [[f"{key}={value_text(value)}" for key, value in values.items()] for values in self.values()]
 
+    def _with_unit(self, key: str, value: Any) -> str:
+        return f"{toml(value, SHOWN)} {self.units.get(key, '')}".rstrip()
+
     @cached_property
     def _labels(self) -> list[str]:
         short = short_names(self.keys)
         return [
-            ", ".join(f"{short[key]} = {toml(value, SHOWN)}" for key, value in values.items())
+            ", ".join(f"{short[key]} = {self._with_unit(key, value)}" for key, value in values.items())
             for values in self.values()
         ]
 

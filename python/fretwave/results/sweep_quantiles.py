@@ -102,7 +102,7 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         told, beyond = _of_few(list(heads.values()), 1)
     for mine in told:
         row = mine[0]
-        place = "".join(f", {key.rpartition('.')[2].replace('_', ' ')} = {row[key]}" for key in keys)
+        place = "".join(f", {_name(key)} = {row[key]} {plan.units.get(key, '')}".rstrip() for key in keys)
         at = reported_at(row["quantity"], by_lead.get(_text(row, keys), []))
         place += f", at amplitude {at}" if at else ""
         lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
@@ -122,6 +122,10 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         for q, n in short.items()
     ]
     return lines
+
+
+def _name(key: str) -> str:
+    return key.rpartition(".")[2].replace("_", " ")
 
 
 def _of_few(groups: Sequence[list[dict[str, Any]]], most: int) -> tuple[list[list[dict[str, Any]]], list[str]]:

@@ -304,9 +304,15 @@ def _said(row: Row, of: Summary) -> str:
         return COUNTS.words(row)
 
 
+def read_plan(group: h5py.Group) -> Plan:
+    """Of a sweep's group in results.h5; older ones have no units of keys."""
+    over = json.loads(group.attrs["over"])
+    return Plan(over, {key: str(group["over"][key].attrs.get("units", "")) for key in over})
+
+
 def read_landmarks(name: str, group: h5py.Group) -> list[str]:
     """The same from a sweep's group in results.h5."""
-    plan, kind = Plan(json.loads(group.attrs["over"])), str(group.attrs["of_type"])
+    plan, kind = read_plan(group), str(group.attrs["of_type"])
     summary, of = group["summary"], summary_of(kind)
     data = {key: summary[key][()] for key in names_of_data(summary)}
     parts = [{of.split: part} for part in summary[of.split][()]] if of.split in summary else [{}]

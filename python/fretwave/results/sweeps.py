@@ -154,13 +154,13 @@ def write_sweep(
     points = _points(plan, branches)
     rows = _summary(kind, plan, branches)
     write_columns(folder / f"{name}.csv", {column.heading: values for column, values in points})
-    columns = summary_columns(kind, branches, rows)
+    columns, keys = summary_columns(kind, branches, rows), key_headings(plan, system_of(branches))
     if summary is not None:
-        write_rows(summary, rows, {column.name: column.heading for column in columns})
+        write_rows(summary, rows, {**keys, **{column.name: column.heading for column in columns}})
     if over_seeds(plan):
         left_out = (*OF_COST, *_lacking(summary_of(kind).cut_off, rows))
         told = [column for column in columns if column.kind == "f" and column.name not in left_out]
-        write_rows(folder / f"{name}_quantiles.csv", quantile_rows(plan, rows, told, split_of(kind)))
+        write_rows(folder / f"{name}_quantiles.csv", quantile_rows(plan, rows, told, split_of(kind)), keys)
     with rewritten(folder / "results.h5", name) as file:
         file.attrs["title"] = title
         group = file.create_group(name)
@@ -215,6 +215,16 @@ def key_values(values: Sequence[Any]) -> Any:
     return np.array([text.encode() for text in texts])
 
 
+def key_column(plan: Plan, key: str, system: UnitSystem) -> Column:
+    """Of a swept key."""
+    return Column(key, plan.units.get(key, ""), "swept key", units=system)
+
+
+def key_headings(plan: Plan, system: UnitSystem) -> dict[str, str]:
+    """Of the swept keys, in tables."""
+    return {key: key_column(plan, key, system).heading for key in plan.keys}
+
+
 def _key_column(plan: Plan, key: str) -> Any:
     """The value of a key in each combination (n,)."""
     place = plan.keys.index(key)
@@ -225,7 +235,8 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
     """All branches under each other, led by the keys."""
     lengths = [branch.points for branch in branches]
     numbers = np.repeat(np.array([branch.number for branch in branches], dtype="i8"), lengths)
-    columns = [(Column(key, "", "swept key"), _key_column(plan, key)[numbers]) for key in plan.keys]
+    system = system_of(branches)
+    columns = [(key_column(plan, key, system), _key_column(plan, key)[numbers]) for key in plan.keys]
     columns.append((Column("value", "1", "number of the combination of values", "i"), numbers))
     for key in table_order(dict.fromkeys(key for branch in branches for key in branch.table)):
         first = next(branch for branch in branches if key in branch.table)
@@ -287,7 +298,7 @@ def _write_points(group: h5py.Group, points: Sequence[tuple[Column, Any]]) -> No
 
 def _write_over(group: h5py.Group, plan: Plan) -> list[h5py.Dataset]:
     for key, values in plan.over.items():
-        group.create_dataset(key, data=key_values(values))
+        group.create_dataset(key, data=key_values(values)).attrs["units"] = plan.units.get(key, "")
         group[key].make_scale(key)
     return [group[key] for key in plan.keys]
 
@@ -303,7 +314,9 @@ def _write_summary(
     split = split_of(kind)
     parts = sorted({row[split] for row in rows if split in row})
     for scale in scales:
-        group.create_dataset(scale.name.rpartition("/")[2], data=scale[()]).make_scale(scale.name.rpartition("/")[2])
+        key = scale.name.rpartition("/")[2]
+        group.create_dataset(key, data=scale[()]).make_scale(key)
+        group[key].attrs["units"] = scale.attrs["units"]
     if parts:
         group.create_dataset(split, data=parts)
     names = [*plan.keys, *([split] if parts else [])]

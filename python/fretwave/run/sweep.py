@@ -16,11 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..case.checks import choose
+from ..case.key_units import key_units
 from ..case.load import Case, load_case
 from ..case.plugins import Plugin
+from ..case.toml.source import Source
 from ..case.uncertainty import SEEDED, draws_of
 from ..console import Estimate, Shown
 from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
+from ..model.laws import laws
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..mpi.petsc_options import said_unread
@@ -47,6 +50,7 @@ class Checked:
     text: str = ""
     analyses: list[str] = field(default_factory=list)
     plugins: tuple[Plugin, ...] = ()
+    key_units: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass
@@ -103,6 +107,7 @@ class Sweep:
         problems = self._problems(found) or self._of_units(found)
         if problems:
             raise CaseErrors(problems, f"the sweep of {display(self.path)}")
+        self.plan = replace(self.plan, units=found[0].key_units)
         return found
 
     def run(self, comm: MPI.Comm, run_id: str) -> list[FretwaveError | None]:
@@ -180,9 +185,17 @@ class Sweep:
         if number:
             return Checked(case.digest, case.units.name)
         units = case.units.name
-        return Checked(
-            case.digest, units, case.resolved, case.title, case.name, case.text, names, case.analyses.plugins
-        )
+        plugins, keys = case.analyses.plugins, self._key_units(case)
+        return Checked(case.digest, units, case.resolved, case.title, case.name, case.text, names, plugins, keys)
+
+    def _key_units(self, case: Case) -> dict[str, str]:
+        """Of the keys that it goes through, as the first value has the case."""
+        source = Source(case.path, case.text)
+        if self.options.quick:
+            source.apply_quick()
+        for assignment in [*self.options.overrides, *self.plan.overrides()[0]]:
+            source.apply_set(assignment)
+        return key_units(source, self.plan.keys, laws(), case.units)
 
     def _of_units(self, found: Sequence[Checked]) -> list[FretwaveError]:
         """The tables of a sweep are in one system."""
