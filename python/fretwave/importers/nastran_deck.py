@@ -31,37 +31,89 @@ def flat(path: Path, wanted: re.Pattern[str]) -> str:
         A card is a copy of another or has a wrong name, a line goes on elsewhere, there are several models, or an
         included file is not there.
     """
-    cards: list[list[str]] = []
-    odd: list[tuple[str, str]] = []
-    going_on, marked = None, ""  # None: there is no card yet
-    astray: list[tuple[str, str, str]] = []
-    ends = {""}
+    deck = _Deck(wanted)
     for place, line in _lines(path, path.parent, ()):
+        if not deck.add(place, line):
+            break
+    deck.check()
+    return _text(deck.cards)
+
+
+class _Deck:
+    """The cards of some names of a deck, taken up line by line.
+
+    Attributes
+    ----------
+    cards : list
+        Name and fields of each.
+    """
+
+    def __init__(self, wanted: re.Pattern[str]) -> None:
+        self._wanted = wanted
+        self._begin()
+
+    def _begin(self) -> None:
+        """What stands before the bulk data counts no more."""
+        self.cards: list[list[str]] = []
+        #: Place and line of copies and of wrong names.
+        self._odd: list[tuple[str, str]] = []
+        #: Place, line and mark of lines that go on with no line before them.
+        self._astray: list[tuple[str, str, str]] = []
+        #: Marks at the ends of the cards so far that are read.
+        self._ends = {""}
+        #: Whether the last card is read; None where there is none yet.
+        self._reading: bool | None = None
+        #: Mark at the end of the last line.
+        self._marked = ""
+
+    def add(self, place: str, line: str) -> bool:
+        """Take up a line; False where the deck ends with it."""
         name, fields, mark = _fields(line)
+        if name == "ENDDATA":
+            self.cards.append([name])
+            return False
         if name.startswith("BEGIN"):
             _check_one_model(place, line)
-            cards, odd, astray, ends, going_on = [], [], [], {""}, None
-        elif name == "ENDDATA":
-            cards.append([name])
-            break
-        elif name[:1] not in ("", "+", "*"):
-            ends |= {_bare(marked)} if going_on else set()
-            known = wanted.match(name)
-            going_on = known is not None and name[known.end() :].strip() in ("", "*")
-            cards += [[known[0], *fields]] if known and going_on else []
-            odd += [(place, line)] if name.startswith("=") or (known and not going_on and "=" not in line) else []
+            self._begin()
+        elif name[:1] in ("", "+", "*"):
+            self._go_on(place, line, name, fields)
         else:
-            if going_on is None or _bare(name) not in ("", _bare(marked)):
-                astray.append((place, line, "" if going_on is None else _bare(name)))
-            if going_on:
-                _check_mark(place, line, marked, name)
-                cards[-1] += fields
-        marked = mark
-    _check_astray(astray, ends | ({_bare(marked)} if going_on else set()))
-    for place, line in odd[:1]:
-        expected, fix = "a name and fields of 8 or 16 columns, or with commas", "write each card out"
-        raise InputError("a card is a copy of another, or has a wrong name", place, line.strip(), expected, fix)
-    return _text(cards)
+            self._card(place, line, name, fields)
+        self._marked = mark
+        return True
+
+    def _card(self, place: str, line: str, name: str, fields: list[str]) -> None:
+        self._ends = self._all_ends()
+        known = self._wanted.match(name)
+        self._reading = known is not None and name[known.end() :].strip() in ("", "*")
+        if known and self._reading:
+            self.cards.append([known[0], *fields])
+        elif name.startswith("=") or (known and "=" not in line):
+            self._odd.append((place, line))
+
+    def _go_on(self, place: str, line: str, name: str, fields: list[str]) -> None:
+        if self._reading is None or _bare(name) not in ("", _bare(self._marked)):
+            self._astray.append((place, line, "" if self._reading is None else _bare(name)))
+        if self._reading:
+            _check_mark(place, line, self._marked, name)
+            self.cards[-1] += fields
+
+    def _all_ends(self) -> set[str]:
+        """With that of the last card, if it is read."""
+        return self._ends | ({_bare(self._marked)} if self._reading else set())
+
+    def check(self) -> None:
+        """At its end.
+
+        Raises
+        ------
+        InputError
+            A line goes on with a card that is not before it, or a card is a copy or has a wrong name.
+        """
+        _check_astray(self._astray, self._all_ends())
+        for place, line in self._odd[:1]:
+            expected, fix = "a name and fields of 8 or 16 columns, or with commas", "write each card out"
+            raise InputError("a card is a copy of another, or has a wrong name", place, line.strip(), expected, fix)
 
 
 def _lines(path: Path, root: Path, above: tuple[Path, ...]) -> Iterator[tuple[str, str]]:
