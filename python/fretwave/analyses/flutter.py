@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from ..case.reporter import Reporter
     from ..hb.harmonics import Harmonics
     from ..hb.nonlinear_mode import NonlinearMode
+    from ..solve.continuation import Continuation
 
 NOT_ANSWERED = "stability of the limit cycles against waves of other nodal diameters and of other families"
 
@@ -145,17 +146,12 @@ def _all_waves(
     context: AnalysisContext[FlutterAnalysis], diameters: Sequence[int], harmonics: Harmonics, writer: AnalysisWriter
 ) -> Outcome:
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
-    first = int(own.get("wave_number", 0))
-    stopped = stopped_before(own)
-    cannot = refused_before(own)
+    first, followed = int(own.get("wave_number", 0)), _Waves(context, diameters, harmonics, writer, own)
     with context.console.progress(context.name):
         for number in range(first, len(diameters)):
-            wave = _Wave(context, diameters, number, harmonics)
-            why = wave.follow(writer, snapshot, found and number == first, stopped, cannot)
-            stopped.update({number: why} if why else {})
-            cannot.update({wave.diameter: wave.cannot} if wave.cannot else {})
-    raise_if_all(cannot, diameters)
-    status, reason, ended = ending_of(stopped, diameters)
+            followed.follow(number, snapshot, found and number == first)
+    raise_if_all(followed.refused, diameters)
+    status, reason, ended = ending_of(followed.stopped, diameters)
     table = finished_table(writer)
     waves = context.comm.bcast(describe_waves(table, diameters) if table else [])
     for wave in waves:
@@ -168,11 +164,11 @@ def _all_waves(
     writer.close(status, reason, events=json.dumps(cycles), waves=json.dumps(waves), **ended)
     context.entry["waves"] = waves
     unit = context.units("length")
-    early = {diameters[number] for number in stopped}
+    early = {diameters[number] for number in followed.stopped}
     summary = [f"{context.name}: {words(wave, unit, wave['nodal_diameter'] in early)}" for wave in waves]
     goal = f"amplitude {context.analysis.amplitude[1]:g} {unit} in every wave"
-    advice = what_to_do(context.name, cannot, diameters)
-    return Outcome(writer.rows, reason, not stopped, summary, goal, advice)
+    advice = what_to_do(context.name, followed.refused, diameters)
+    return Outcome(writer.rows, reason, not followed.stopped, summary, goal, advice)
 
 
 def _beside_other_families(context: AnalysisContext[FlutterAnalysis], wave: Mapping[str, Any]) -> dict[str, Any]:
@@ -193,63 +189,66 @@ def _beside_other_families(context: AnalysisContext[FlutterAnalysis], wave: Mapp
         return {"limit_cycles": with_others(fed, cycles)} if stable else found_of(fed)
 
 
-class _Wave:
-    """The branch of one nodal diameter."""
+class _Waves:
+    """The branches of all nodal diameters, which are followed one after the other.
+
+    Attributes
+    ----------
+    stopped : dict
+        Why branches stopped early or could not begin, by the number of the wave.
+    refused : dict
+        Errors of those that could not begin, by nodal diameter.
+    """
 
     def __init__(
         self,
         context: AnalysisContext[FlutterAnalysis],
         diameters: Sequence[int],
-        number: int,
         harmonics: Harmonics,
-    ) -> None:
-        self.context, self.number, self.count, self.harmonics = context, number, len(diameters), harmonics
-        self.diameter = diameters[number]
-        self.analysis = context.analysis
-        self.cannot: Optional[InputError] = None  #: why it cannot begin
-
-    def follow(
-        self,
         writer: AnalysisWriter,
-        snapshot: Optional[dict[str, Any]],
-        go_on: bool,
-        earlier: Mapping[int, str],
-        refused: Mapping[int, InputError],
-    ) -> str:
-        """Write its points, with why earlier waves stopped or could not begin; returns why it did. Collective."""
-        analysis = self.analysis
-        with in_wave_of(self.context, self.diameter) as own_context:
+        own: Mapping[str, Any],
+    ) -> None:
+        self.context, self.diameters, self.harmonics, self.writer = context, diameters, harmonics, writer
+        self.analysis = context.analysis
+        self.stopped, self.refused = stopped_before(own), refused_before(own)
+
+    def follow(self, number: int, snapshot: Optional[dict[str, Any]], go_on: bool) -> None:
+        """Write the points of a wave, from the snapshot on if it is to go on. Collective."""
+        diameter = self.diameters[number]
+        with in_wave_of(self.context, diameter) as own_context:
             try:
                 problem = self._problem(own_context)
             except InputError as error:  # on all ranks; other waves may begin
-                self.cannot = error
-                return why_not(self.diameter, error)
-            name = f"{self.context.name}: nodal diameter {self.diameter}"
-            low, high = analysis.amplitude
-            branch = continuation(own_context, problem, (low, high), analysis.report_at, snapshot, go_on, name)
-            for point in points_of(branch):
-                own = {**with_stopped(earlier, wave_number=self.number), **with_refused(refused)}
-                now = branch.problem
-                self._say(record(writer, now, point, branch.snapshot(), own, self._column, self.analysis.errors))
+                self.refused[diameter], self.stopped[number] = error, why_not(diameter, error)
+                return
+            name = f"{self.context.name}: nodal diameter {diameter}"
+            low, high = self.analysis.amplitude
+            branch = continuation(own_context, problem, (low, high), self.analysis.report_at, snapshot, go_on, name)
+            self._points(branch, number)
             tell(self.context, branch, name)
-            stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"
+            if not branch.converged:
+                self.stopped[number] = f"nodal diameter {diameter}: {branch.reason}"
             branch.destroy()
             problem.destroy()
-        return stopped
 
-    def _column(self, *_: object) -> dict[str, int]:
-        return {"nodal_diameter": self.diameter}
+    def _points(self, branch: Continuation, number: int) -> None:
+        """Write each, with what a run that goes on from there must know of the waves before. Collective."""
+        column, errors = {"nodal_diameter": self.diameters[number]}, self.analysis.errors
+        own = {**with_stopped(self.stopped, wave_number=number), **with_refused(self.refused)}
+        for point in points_of(branch):
+            row = record(self.writer, branch.problem, point, branch.snapshot(), own, lambda *_: column, errors)
+            self._say(number, row)
 
     def _problem(self, context: AnalysisContext[FlutterAnalysis]) -> NonlinearMode:
         """Started from the mode of the structure alone; the flow bends it little."""
         start, rest = start_mode(context, self.analysis.linear_mode)
         return mode_problem(context, self.harmonics, start, rest)
 
-    def _say(self, row: Mapping[str, Any]) -> None:
+    def _say(self, number: int, row: Mapping[str, Any]) -> None:
         low, high = self.analysis.amplitude
-        share = (self.number + math.log(row["amplitude"] / low) / math.log(high / low)) / self.count
-        units = self.context.units
-        line = point_line(f"{self.context.name} ND {with_sign(self.diameter):>3}", dict(row), units, units("length"))
+        share = (number + math.log(row["amplitude"] / low) / math.log(high / low)) / len(self.diameters)
+        units, diameter = self.context.units, self.diameters[number]
+        line = point_line(f"{self.context.name} ND {with_sign(diameter):>3}", dict(row), units, units("length"))
         self.context.console.point(line, line, share, notable(row, units))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
@@ -39,6 +39,28 @@ from ..units import SI, SYSTEMS
 
 #: What stands at the top level and is no section with keys of its own.
 LINES = ("title", "plugins", "quick")
+#: Sections of a case by their titles.
+SECTIONS: Mapping[str, type[BaseModel]] = {
+    "[model]": ModelSection,
+    "[reduction]": ReductionSection,
+    "[preload]": PreloadSection,
+    "[damping]": DampingSection,
+    "[aerodynamics]": AerodynamicsSection,
+    "[uncertainty]": UncertaintySection,
+    "[[contact]] (and the parameters of its law: numbers, lists or .csv files, one value a pair)": ContactSection,
+    "[material]": MaterialSection,
+    "[[gauge]]": GaugeSection,
+    "[[analysis]]": AnalysisSection,
+}
+#: Tables inside them, and what no run reads.
+TABLES: Mapping[str, type[BaseModel]] = {
+    "step = { ... }": StepSection,
+    "mistuning = { ... }": MistuningSection,
+    "dampers = [{ ... }]": Damper,
+    "normalise = { ... }, observe = { ... }": ObservedTable,
+    "values.KEY = { ... }, factors.KEY = { ... } of [uncertainty]": DistributionSection,
+    "[study]": StudySection,
+}
 
 
 def key_lines(case: Path | None = None) -> Iterator[str]:
@@ -55,38 +77,15 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
     units = str if case is None else _symbols(Source(case))
     yield "top level"
     yield from (f"  {name:<18} {'':<12} {text}" for name, text in TOP_LEVEL.items() if name in LINES)
-    sections: dict[str, type[BaseModel]] = {
-        "[model]": ModelSection,
-        "[reduction]": ReductionSection,
-        "[preload]": PreloadSection,
-        "[damping]": DampingSection,
-        "[aerodynamics]": AerodynamicsSection,
-        "[uncertainty]": UncertaintySection,
-        "[[contact]] (and the parameters of its law: numbers, lists or .csv files, one value a pair)": ContactSection,
-        "[material]": MaterialSection,
-        "[[gauge]]": GaugeSection,
-        "[[analysis]]": AnalysisSection,
-    }
-    for title, section in sections.items():
-        yield title
-        yield from _section(section, units)
+    for title, section in SECTIONS.items():
+        yield from _titled(title, section, units)
         if section is ContactSection:
             for law in laws().values():
                 yield from _law(law, units)
     for kind, analysis in kinds().items():
-        yield f'[[analysis]] with type = "{kind}"'
-        yield from _section(analysis, units, without=set(AnalysisSection.model_fields))
-    tables: dict[str, type[BaseModel]] = {
-        "step = { ... }": StepSection,
-        "mistuning = { ... }": MistuningSection,
-        "dampers = [{ ... }]": Damper,
-        "normalise = { ... }, observe = { ... }": ObservedTable,
-        "values.KEY = { ... }, factors.KEY = { ... } of [uncertainty]": DistributionSection,
-        "[study]": StudySection,
-    }
-    for title, nested in tables.items():
-        yield title
-        yield from _section(nested, units)
+        yield from _titled(f'[[analysis]] with type = "{kind}"', analysis, units, AnalysisSection.model_fields)
+    for title, table in TABLES.items():
+        yield from _titled(title, table, units)
 
 
 def schema_text(case: Path | None = None) -> str:
@@ -119,7 +118,11 @@ def _load_plugins(case: Path) -> None:
         raise CaseErrors(found, source.label)
 
 
-def _section(section: type[BaseModel], units: Callable[[str], str], without: Collection[str] = ()) -> Iterator[str]:
+def _titled(
+    title: str, section: type[BaseModel], units: Callable[[str], str], without: Collection[str] = ()
+) -> Iterator[str]:
+    """The title and a line for each key, but for some."""
+    yield title
     for name, field in section.model_fields.items():
         if name not in without:
             yield f"  {name:<18} {_default(field):<12} {describe(field, units)}{_choices(field.annotation)}"
