@@ -65,7 +65,7 @@ class Plan:
         """Written once: every value of a sweep asks for its own."""
         return [[f"{key}={value_text(value)}" for key, value in values.items()] for values in self.values()]
 
-    def _with_unit(self, key: str, value: Any) -> str:
+    def _with_unit(self, key: str, value: object) -> str:
         return f"{toml(value, SHOWN)} {self.units.get(key, '')}".rstrip()
 
     @cached_property
