@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numbers as numbers_abc
 import operator
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -116,6 +117,12 @@ def numbers(
 def masked(values: object) -> bool:
     """Whether an entry of an array is masked: anything may stand behind it."""
     return isinstance(values, np.ma.MaskedArray) and bool(np.any(values.mask))
+
+
+def listed(values: object) -> Array:
+    """Those of any collection, also of what can be gone through once; as no numbers what is a dict, a text or none."""
+    plain = isinstance(values, Iterable) and not isinstance(values, (Mapping, str, bytes, np.ndarray))
+    return array_of(list(values) if plain else values)  # type: ignore[call-overload]
 
 
 def array_of(values: object) -> Array:

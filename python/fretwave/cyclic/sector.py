@@ -31,7 +31,7 @@ from ..given import whole
 from ..model.contact import Contact
 from ..model.model import Model
 from ..model.modes import LinearMode
-from ..model.sectors import Given, Parts, Term, by_sector, check_balanced, check_number, in_wave, real_csr
+from ..model.sectors import Given, Parts, Term, by_sector, check_balanced, check_number, check_square, in_wave, real_csr
 from ..model.structure import Structure
 from .aerodynamics import Aerodynamics, period_of, with_terms
 
@@ -69,6 +69,7 @@ class Sector:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sectors", check_number(self.sectors))
+        check_square({"K": self.K, "M": self.M, "C": self.C})
         for name in ("K", "M", "C"):
             check_balanced(getattr(self, name), name)
 

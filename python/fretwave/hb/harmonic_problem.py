@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array, Indices
 from ..errors import InputError
+from ..kinds import of_their_kinds
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
@@ -131,6 +132,7 @@ class HarmonicProblem(Destroyable):
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
         return on_rank_0(self.model.comm, self.local_coefficients(y))
 
+    @of_their_kinds
     def local_coefficients(self, y: PETSc.Vec) -> Array:
         """This rank's rows of `coefficients`. Collective."""
         Q = self.core.coefficients(y)

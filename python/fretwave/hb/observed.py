@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..columns import MODAL_UNIT
 from ..errors import InputError
-from ..given import whole
+from ..given import array_of, whole
 from ..model.model import Model
 from ..model.modes import LinearMode
 
@@ -31,10 +31,10 @@ def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
             fix = "take a real mode, or a dof"
             raise InputError("a complex mode has no one coordinate", None, repr(observed), "a standing wave", fix)
         return row_of(model, model.inertia(observed.shape))
-    if np.ndim(observed) == 0:
+    if array_of(observed).ndim == 0:
         return [(_dof(model, cast(int, observed)), 1.0)]
-    row = np.asarray(observed)
-    if row.dtype.kind not in "biufcO" or np.any(np.imag(row) != 0):
+    row = array_of(observed)
+    if row.dtype.kind not in "biufc" or np.any(np.imag(row) != 0):
         raise InputError("a row of displacements is real", None, f"entries of type {row.dtype}", "weights", "give one")
     row = np.real(row).astype(float)
     if row.shape != (model.n_dof,) or not np.isfinite(row).all():

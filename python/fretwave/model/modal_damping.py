@@ -24,8 +24,8 @@ from ..arrays import Array, Complex
 from ..errors import InputError
 from ..given import array_of, not_negative, whole
 from ..texts import counted
-from .contact import Contact
-from .sectors import Term, by_sector, check_number, real_csr
+from .contact import Contact, contact_list
+from .sectors import Term, by_sector, check_number, check_square, real_csr
 
 #: A damping ratio of all modes, of the lowest, or by the number of the mode (1 is the lowest).
 Ratios = Union[float, Sequence[float], Mapping[int, float]]
@@ -64,10 +64,10 @@ def modal_damping(
         More dofs than full matrices are made of, a mode that is not there, two ratios of modes of one frequency, a
         ratio that is negative or no number.
     """
-    if sectors:
-        sectors = check_number(sectors)
-    n = int(np.shape(by_sector(M)[0])[0])
+    sectors = check_number(sectors) if whole(sectors) != 0 else 0
+    n = check_square({"M": by_sector(M) or [], "K": by_sector(K) or []})
     check_size(n, sectors)
+    contacts = contact_list(contacts)
     waves = range(sectors // 2 + 1) if sectors else range(1)
     found = [_of_wave(M, K, ratios, contacts, 2 * np.pi * d / (sectors or 1), d) for d in waves]
     return {0: sp.csr_matrix(found[0].real)} if not sectors else _terms(found, sectors)

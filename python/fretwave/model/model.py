@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from operator import index
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,12 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import LARGEST, array_of, masked, with_a_square
+from ..given import LARGEST, array_of, masked, whole, with_a_square
 from ..kinds import of_their_kinds
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
+from ..texts import shortened
 from ..units import SI, UnitSystem, unit_system
 from .checks import check_entries, check_inertia
 from .contact import Contact, contact_list
@@ -95,7 +95,7 @@ class Model(Destroyable):
         first = terms[0][0]
         if comm is None:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
-        self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, index(unit)
+        self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, _unit_of(unit)
         self._own: list[PETSc.Mat] = [self._matrix(A, "KCM"[order], k) for A, order, k in terms]
         self._places = [(order, k) for _, order, k in terms]
         given = contact_list(contacts)
@@ -367,22 +367,22 @@ class Model(Destroyable):
     def local_sliders(self, sliders: Mapping[str, Array]) -> list[list[float]]:
         """Those of this rank's pairs, contact by contact, as the core takes them."""
         named = {contact.name: contact for contact in self.contacts if contact.info.memory}
-        if set(sliders) != set(named):
+        if not isinstance(sliders, Mapping) or set(sliders) != set(named):
             fix = "give (n_pairs, n_tangents) of each"
-            raise InputError("sliders at rest are of other contacts", None, list(sliders), list(named), fix)
+            raise InputError("sliders at rest are of other contacts", None, repr(sliders), list(named), fix)
         out: list[list[float]] = []
         for k, contact in enumerate(self.contacts):
             if contact.name not in named:
                 out.append([])
                 continue
             pairs = np.shape(by_sector(contact.B)[0])[0] // contact.components
-            given, wanted = np.asarray(sliders[contact.name], dtype=float), (pairs, _tangents(contact))
-            if given.shape != wanted or not np.isfinite(given).all():
+            given, wanted = array_of(sliders[contact.name]), (pairs, _tangents(contact))
+            if given.shape != wanted or given.dtype.kind not in "biuf" or not np.isfinite(given).all():
                 where = f"contact '{contact.name}'"
                 raise InputError(
                     "sliders at rest do not fit", where, given.shape, f"{wanted}, finite", "one row a pair"
                 )
-            out.append(given[self._pairs[k]].T.ravel().tolist())
+            out.append(given[self._pairs[k]].T.astype(float).ravel().tolist())
         return out
 
     def __repr__(self) -> str:
@@ -396,3 +396,12 @@ class Model(Destroyable):
         for mat in self._own:
             mat.destroy()
         self._own = []
+
+
+def _unit_of(given: object) -> int:
+    """Dofs that stay together on a rank."""
+    unit = whole(given)
+    if unit is None or not 1 <= unit < 2**31:
+        what, fix = "ranks take no such groups of dofs", "give the number of dofs of a sector, or leave it out"
+        raise InputError(what, "Model(unit=...)", shortened(repr(given), 60), "a whole number from 1 up", fix)
+    return unit

@@ -26,6 +26,8 @@ Given: TypeAlias = sp.spmatrix
 #: A matrix, or {k: that on the sector k places ahead}.
 Term: TypeAlias = sp.spmatrix
 Parts = Mapping[int, Given]
+#: Numbers of sectors and of nodal diameters are below it.
+LARGEST_NUMBER = 2**31
 
 
 def real_csr(given: Given, where: str | None = None) -> Sparse:
@@ -55,7 +57,7 @@ def _dense(given: npt.ArrayLike, where: str | None) -> npt.NDArray[Any]:
     try:
         array = np.asarray(given)
         array = array.astype(float) if array.dtype.kind == "O" else array
-    except (TypeError, ValueError):  # rows of different lengths, None among them
+    except (TypeError, ValueError, OverflowError):  # rows of different lengths, None among them
         array = np.asarray(type(given).__name__)
     hidden = masked(given)
     if array.dtype.kind not in "biufc" or array.ndim > 2 or hidden:
@@ -79,7 +81,7 @@ def check_wave(sectors: int, nodal_diameter: int) -> tuple[int, int]:
     InputError
     """
     number, diameters = whole(sectors) or 0, whole(nodal_diameter)
-    if number < 1 or diameters is None:
+    if not 1 <= number < LARGEST_NUMBER or diameters is None or abs(diameters) >= LARGEST_NUMBER:
         what, measured = (
             "a wave goes a whole number of times around a wheel",
             f"sectors={sectors!r}, nodal_diameter={nodal_diameter!r}",
@@ -152,6 +154,27 @@ def check_number(sectors: int) -> int:
     if number < 2:
         raise InputError("a wheel has two sectors or more", None, sectors, "a whole number >= 2", "give their number")
     return number
+
+
+def check_square(given: Mapping[str, Term | None]) -> int:
+    """Rows of the matrices of these names, by sector or not, which are all square, of one size and finite.
+
+    Raises
+    ------
+    InputError
+        There is none, or one is not so.
+    """
+    parts = {
+        f"{name}[{k}]" if is_by_sector(term) else name: real_csr(A, name)
+        for name, term in given.items()
+        for k, A in by_sector(term).items()
+    }
+    n = next((A.shape[0] for A in parts.values()), 0)
+    for where, A in parts.items():
+        if A.shape != (n, n) or not n or not np.isfinite(A.data).all():
+            measured, expected = f"{A.shape[0]} x {A.shape[1]} entries", f"{n or 1} x {n or 1} finite numbers"
+            raise InputError("a matrix cannot be used", where, measured, expected, "give square ones of one size")
+    return n
 
 
 def check_balanced(given: Term | None, name: str) -> None:

@@ -127,7 +127,8 @@ def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
             states.append((first, known := []))
         known.append(contact + also)
     word = "but" if any(mode["contact"] == STUCK for mode in fed) else "though"
-    return "".join(f", {word} {_gains(mode)} ({'; '.join(where)})" for mode, where in states)
+    told = [f"{_gains(mode)} ({'; '.join(where)})" for mode, where in states]
+    return f", {word} {', and '.join(told)}" if told else ""
 
 
 def _alike(mode: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

@@ -15,6 +15,7 @@ from ..arrays import Array
 from ..columns import PURE, table_order
 from ..errors import InputError
 from ..files.dimensions import names_of_data
+from ..given import whole
 from ..hb.states import State
 from ..model.law_info import UNKNOWN, Role, kept_laws
 from ..post.mode_curve import ModeCurve
@@ -87,7 +88,14 @@ class Analysis:
         """Harmonic coefficients (len(points), n_dof, m) [length] of some points or all; axes as `dofs` and `labels`."""
         with open_results(self.path) as file:
             found = file[self.name]["coefficients"]
-            return np.asarray(found) if points is None else np.stack([found[p] for p in points])
+            if points is None:
+                return np.asarray(found)
+            numbers = [whole(point) for point in points] if isinstance(points, Iterable) else [None]
+            rows = [found[number] for number in numbers if number is not None and -len(found) <= number < len(found)]
+            if len(rows) < len(numbers) or not rows:
+                expected, fix = f"a list of numbers below {len(found)}", "give for example [0]"
+                raise InputError("these are no points of the analysis", self.name, repr(points), expected, fix)
+            return np.stack(rows)
 
     def loop(self, contact: str, point: int) -> Table:
         """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs).

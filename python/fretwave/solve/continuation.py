@@ -11,11 +11,12 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..errors import InputError
-from ..given import with_a_square
+from ..given import listed, with_a_square
 from ..hb.harmonic_problem import HarmonicProblem
 from ..kinds import of_their_kinds
 from ..mpi.log import event
 from ..mpi.spread import Cuttable, Spread, fill
+from ..texts import shortened
 from .starting import far_from_start, given, starts
 from .steps import StepControl
 from .trace import Knot
@@ -64,6 +65,23 @@ class Point:
         return f"Point({self.index}:{what} at {self.parameter:.6g}, residual {self.residual:.1e})"
 
 
+def _ends(stop: object) -> tuple[float, float]:
+    found = listed(stop)
+    if found.shape != (2,) or found.dtype.kind not in "biuf" or np.isnan(found).any():
+        what, fix = "the range of the branch is no pair of numbers", "give for example stop=(0.1, 1.0)"
+        raise InputError(what, "Continuation(stop=...)", shortened(repr(stop), 60), "(low, high)", fix)
+    return float(found[0]), float(found[1])
+
+
+def reports_of(given: object) -> list[float]:
+    """Parameter values, as numbers."""
+    values = listed(given)
+    if values.ndim != 1 or values.dtype.kind not in "biuf" or not np.isfinite(values).all():
+        fix = "give for example report_at=[0.1, 1.0]"
+        raise InputError("no point can be located there", "report_at", repr(given), "a list of numbers", fix)
+    return [float(value) for value in values]
+
+
 class Continuation:
     """Follows a problem's branch from y0 until its parameter leaves (low, high). Collective.
 
@@ -96,7 +114,7 @@ class Continuation:
         upwards: bool | None = None,
         way: bool = False,
     ) -> None:
-        low, high = stop
+        low, high = stop = _ends(stop)
         if not low < high:
             raise InputError(
                 "the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values"
@@ -104,7 +122,7 @@ class Continuation:
         with_a_square("an end of the branch", max(1.0, *(end for end in stop if end < np.inf)), "choose other units")
         self.problem, self._y0, self._low, self._high = problem, y0, low, high
         self._core = _core.Continuation(
-            problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
+            problem.core, problem.prefix, low, high, (steps or StepControl()).core(), reports_of(report_at)
         )
         if way:
             self._core.follow_as_way()

@@ -18,7 +18,7 @@ from ..hb.observer import Observer
 from ..kinds import of_their_kinds
 from ..mpi.same import expect_same
 from .branch import Branch
-from .continuation import Continuation, Point
+from .continuation import Continuation, Point, reports_of
 from .refining import RefiningContinuation
 from .steps import StepControl
 from .table import Table
@@ -203,15 +203,6 @@ def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, floa
         fix = "start within it, or give the end alone: stop=high"
         raise InputError("the branch begins outside its range", None, first, f"{low:g} to {high:g}", fix)
     return low, high, None
-
-
-def reports_of(given: Sequence[float]) -> list[float]:
-    """Parameter values, as numbers."""
-    values = array_of(given)
-    if values.ndim != 1 or values.dtype.kind not in "biuf" or not np.isfinite(values).all():
-        fix = "give for example report_at=[0.1, 1.0]"
-        raise InputError("no point can be located there", "report_at", repr(given), "a list of numbers", fix)
-    return [float(value) for value in values]
 
 
 def _outside(reports: Sequence[float], low: float, high: float, met: Sequence[float]) -> list[str]:

@@ -150,6 +150,7 @@ def static_preload(
     reference = reference or linear_modes(model, 1)[0]
     rest = balanced(model, reference)
     load = load if balance else load - rest.load
+    closed = None if closed is None else model.numbers(closed)
     history = None if sliders is None else model.local_sliders(sliders)
     control = steps or StepControl(initial=0.1, maximum=0.5)
 

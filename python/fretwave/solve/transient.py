@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from petsc4py import PETSc
 
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import numbers, positive, positive_or_infinite
+from ..given import array_of, numbers, positive, positive_or_infinite, whole
 from ..kinds import of_their_kinds
 from ..model.model import Model
 from ..mpi.gather import on_all_ranks
@@ -49,6 +50,12 @@ class Transient:
         omega: float | None = None,
         prefix: str = "transient_",
     ) -> None:
+        level, omega = float(numbers("level", level)), float(numbers("omega", 0.0 if omega is None else omega))
+        if not isinstance(prefix, str):
+            raise InputError("a prefix is no text", "Transient(prefix=...)", repr(prefix), "a text", "leave it out")
+        if force is not None and not isinstance(force, Mapping):
+            what, expected = "the force has no harmonics", "a dict by whole orders"
+            raise InputError(what, "force", repr(force), expected, "write {1: P}, P one number a dof")
         if force and not omega:
             raise InputError("a force needs its frequency", None, omega, "omega > 0", "give omega")
         if model.sectors > 1:
@@ -61,11 +68,17 @@ class Transient:
             )
         model.check_unchanged()
         self.model = model
-        parts = [
-            (order, model.vector(level * np.real(P)), model.vector(-level * np.imag(P)))
-            for order, P in (force or {}).items()
-        ]
-        self._core = _core.Transient(model.core, parts, float(omega or 0.0), prefix)
+        parts = [self._part(model, order, array_of(P), level) for order, P in (force or {}).items()]
+        self._core = _core.Transient(model.core, parts, omega, prefix)
+
+    @staticmethod
+    def _part(model: Model, order: int, P: Array, level: float) -> tuple[int, PETSc.Vec, PETSc.Vec]:
+        """Order and vectors of the cosine and the sine of a harmonic of the force."""
+        number = whole(order)
+        if number is None or P.dtype.kind not in "biufc":
+            measured, fix = f"{order!r}: {P.dtype}", "write {1: P}, P one number a dof"
+            raise InputError("the force has no harmonics", "force", measured, "a dict by whole orders", fix)
+        return number, model.vector(level * np.real(P)), model.vector(-level * np.imag(P))
 
     def __repr__(self) -> str:
         return f"Transient(of {self.model})"

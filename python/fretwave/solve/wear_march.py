@@ -15,7 +15,7 @@ from ..hb.nonlinear_mode import NonlinearMode
 from ..kinds import of_their_kinds
 from ..mpi.same import expect_same
 from .branch import Branch
-from .follow import reports_of
+from .continuation import reports_of
 from .steps import WearControl
 from .table import Table
 from .wear import Wear, WearPoint
@@ -132,7 +132,7 @@ def wear(
     if not isinstance(problem, NonlinearMode):
         what, fix = "the branch is not that of a mode", "follow a fw.NonlinearMode for it"
         raise InputError(what, "wear(branch=...)", repr(problem), "a NonlinearMode", fix)
-    reports = reports_of(report_at)
+    amplitude, reports = positive("amplitude", amplitude), reports_of(report_at)
     asked = [amplitude, coefficient, cycles, cycle_unit or 0.0, -1.0 if errors is None else errors, *reports]
     expect_same(problem.model.comm, "amplitude, coefficient, cycles and reports of wear", asked)
     places = branch.at(amplitude=amplitude)
