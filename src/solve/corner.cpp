@@ -122,8 +122,8 @@ bool Continuation::beyond_corner(Trial const& trial) const {
   return s > 0 && r >= -meets * s && weighted_norm(weights_, chord) <= meets * s * std::sqrt(turned);
 }
 
-/// Whether a trial lies ahead on the anchor's tangent and on its own, which `sign` orients, but for a share of
-/// the way: in all unknowns, the mean among them. Collective.
+/// Whether a trial lies ahead on the anchor's tangent and on its own, which `sign` orients, but for a share
+/// of the way: in all unknowns, the mean among them. Collective.
 bool Continuation::straight_there(Trial const& trial, int sign) const {
   const VecHandle chord = moved(trial.y, -1, anchor_.y);
   Vec first = anchor_.tangent, second = trial.tangent;
