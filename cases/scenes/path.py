@@ -148,6 +148,8 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
     start, end, here = near[j - first], near[j - first + 1], run.state(int(rows[i]))
     chord = (end[0] - start[0]).ravel()
     square, beside = chord @ chord, 0.0
+    if square == 0.0:  # rows that rounding alone tells apart
+        return False
     for _ in range(ABREAST):
         found = distance(run.equations, *_by_cubic(near, j - first, along))
         if not found.found:
