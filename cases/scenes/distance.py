@@ -151,6 +151,7 @@ def least_step(eq, J, R, now, size, held=False):
     n, forced = Q.size, eq.method == "forced"
     columns = np.r_[np.full(n, size), abs(omega), abs(omega)]
     J = J @ sp.diags(columns)
+    J.data[~np.isfinite(J.data)] = 0.0  # at a kink it has no value; whether the step is good the residual tells
     if forced:
         J = sp.hstack([J[:, :n], J[:, n + 1 :]], format="csr")
     else:
