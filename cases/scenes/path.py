@@ -148,8 +148,6 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
     start, end, here = near[j - first], near[j - first + 1], run.state(int(rows[i]))
     chord = (end[0] - start[0]).ravel()
     square, beside = chord @ chord, 0.0
-    if square == 0.0:  # rows that rounding alone tells apart
-        return False
     for _ in range(ABREAST):
         found = distance(run.equations, *_by_cubic(near, j - first, along))
         if not found.found:
@@ -158,7 +156,9 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
         missed = (off @ chord) / square
         beside = float(np.linalg.norm(off - chord * missed) / np.sqrt(square))
         along += missed
-        if abs(missed) < APART or not -1 < along < 2:  # beside the chord there is nothing to be solved
+        if not -1 < along < 2:  # abreast of another piece, as where the mean moves far and all else comes back
+            return False
+        if abs(missed) < APART:
             break
     return beside < APART
 
