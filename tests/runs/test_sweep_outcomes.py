@@ -215,3 +215,26 @@ def test_a_level_that_stopped_leaves_the_others_in_the_quantiles(tmp_path: Path,
     assert counts == {("0.5", "8"), ("2.0", str(len(bounded)))}
     said = [f"seed = {seed} (level 2)" for seed in limits if seed not in bounded]
     assert f"{len(said)} of 8 values: {'; '.join(said)}" in capsys.readouterr().out
+
+
+def test_a_response_that_moves_most_at_an_end_of_the_range_is_told_to_have_no_peak(tmp_path: Path, capsys) -> None:
+    """A stuck slider on m = k = 1: stuck frequencies of kt = 1 and 3 are 0.2251 and 0.3183 Hz, the range holds one."""
+    forced = '[[analysis]]\nname = "forced"\ntype = "forced"\nharmonics = 1\nsamples = 64\nforce = { x = 1e-3 }\n'
+    forced += 'levels = [0.5, 1.0]\nfrequency = [0.2, 0.25]\nobserve = "x"\n'
+    damped = CASE.replace("K = [[1.0]]", "K = [[1.0]]\nmass_damping = 0.05")
+    drawn = '[uncertainty]\nfactors.model.mass_damping = { distribution = "uniform", low = 0.9, high = 1.1 }\n'
+    case, over = tmp_path / "case.toml", ["--over", "contact.slider.tangential_stiffness=1.0,3.0"]
+    case.write_text(drawn + damped + forced)
+    for name, seeds, said in (("plain", [], "2 of 4"), ("drawn", ["--over", "uncertainty.seed=1:3"], "6 of 12")):
+        run = tmp_path / name
+        assert call("sweep", case, *over, *seeds, "--only", "forced", "--no-plots", "--out", run) == 0
+        told = f"forced: {said} responses move most at an end of the frequency range (peak_within = 0)"
+        assert told in capsys.readouterr().out
+        table = [(row["contact.slider.tangential_stiffness"], row["peak_within"]) for row in rows(run / "summary.csv")]
+        assert set(table) == {("1.0", "1"), ("3.0", "0")}
+        assert call("show", run) == 0
+        assert told in capsys.readouterr().out
+    stiff = ["--set", "contact.slider.tangential_stiffness=3.0", "--only", "forced", "--no-plots", "-q"]
+    assert call("run", case, *stiff, "--out", tmp_path / "one") == 0
+    assert call("show", tmp_path / "one") == 0
+    assert "0.25 Hz (at an end of the range: the peak is beyond)" in capsys.readouterr().out

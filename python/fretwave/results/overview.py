@@ -110,7 +110,8 @@ class Overview:
         if not top:
             return ""
         sector = f" of sector {top['largest_sector']:.0f}" if "largest_sector" in top else ""
-        return f"a {top[amplitude_column(top)]:.4g} {self.unit}{sector}, {top['frequency_hz']:.4g} Hz"
+        beyond = " (at an end of the range: the peak is beyond)" * (not top.get("within", True))
+        return f"a {top[amplitude_column(top)]:.4g} {self.unit}{sector}, {top['frequency_hz']:.4g} Hz{beyond}"
 
     def _error(self) -> str:
         if not self.error:
@@ -203,6 +204,9 @@ def _peak(table: Mapping[str, Any], group: h5py.Group) -> dict[str, Any]:
         *("largest_amplitude", "largest_sector", "frequency_hz", "omega_error"),
     )
     found: dict[str, Any] = {"point": top, **{key: float(table[key][top]) for key in wanted if key in table}}
+    if "level" in table and "over" not in group:  # branches of a sweep's values stand one after the other
+        rows = np.flatnonzero(table["level"] == table["level"][top])
+        found["within"] = bool(rows[0] < top < rows[-1])
     if "cycles" in table:
         factor, found["worn_unit"] = units_of(group.attrs).of_volumes
         found["worn"] = float(factor * np.sum([table[key] for key in table if key.startswith("worn_")], axis=0).max())

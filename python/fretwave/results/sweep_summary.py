@@ -19,6 +19,7 @@ from ..post.limit_cycles import SHORT, limit_cycles
 from ..post.mode_curve import ModeCurve, lowest, most_damped, varies, without_rounding
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
+from ..texts import counted
 from .file import unit_of_amplitudes
 from .sweep_quantiles import AMPLITUDE_AT, over_seeds, quantile_lines
 
@@ -66,6 +67,7 @@ AT = (
 FORCED = (
     Column("largest_amplitude", "length", "largest amplitude of the response"),
     Column("frequency_of_largest_amplitude", "Hz", "frequency of the largest amplitude"),
+    Column("peak_within", "1", "1: the largest amplitude is a peak; 0: it is at an end of the frequency range", "i"),
 )
 WHEEL_FORCED = (
     Column("largest_blade_amplitude", "length", "peak of the sector that moves most"),
@@ -258,6 +260,7 @@ def _forced(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     return {
         "largest_amplitude": float(table["amplitude"][top]),
         "frequency_of_largest_amplitude": float(table["frequency_hz"][top]),
+        "peak_within": int(0 < top < len(table["amplitude"]) - 1),
         **_largest_blade(table, attributes),
     }
 
@@ -353,8 +356,20 @@ def _forced_words(row: Row) -> str:
     return f"largest {amplitude:.4g} {row['unit']}{place} at {frequency:.6g} Hz"
 
 
+def _forced_note(rows: Sequence[Row]) -> str:
+    """How many responses have no peak within the range: what is told of them, and quantiles, are too small."""
+    ended = [row for row in rows if row.get("done", 1) == 1 and not row.get("largest_blade", math.nan) >= 0]
+    beyond = sum(row.get("peak_within", 1) == 0 for row in ended)  # not of older results
+    if not beyond:
+        return ""
+    return (
+        f"{beyond} of {counted(len(rows), 'response')} move most at an end of the frequency range (peak_within = 0):"
+        " their peaks are beyond it, and higher than what is told of them; widen `frequency`"
+    )
+
+
 #: Of one dof, where a wheel has the blade that moves most.
-_OF_ONE = tuple(column.name for column in FORCED)
+_OF_ONE = tuple(column.name for column in FORCED if column.kind == "f")
 MODE_BRANCH = Summary(
     MODE, _mode, _mode_words, on_wheel=WHEEL_MODE, spread=("largest_zeta", "last_frequency_hz", "largest_amplification")
 )
@@ -366,4 +381,5 @@ FORCED_LEVELS = Summary(
     "level",
     WHEEL_FORCED,
     (*_OF_ONE, "largest_blade_amplitude", "largest_blade_frequency_hz", "blade_amplification"),
+    note=_forced_note,
 )
