@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from tolerances import LAST_DIGITS, ROUNDING
 
+from fretwave.fe.strain import COMPONENTS
 from fretwave.post.fatigue import (
     first_reaching,
     goodman,
@@ -64,6 +66,17 @@ def test_odd_harmonics_have_half_the_range_of_the_difference_of_two_instants() -
     over = (stress[0] @ basis).T
     ranges = von_mises_square((over[:, None] - over[None]).reshape(-1, 6))
     assert stress_amplitude(LABELS, stress)[0] == pytest.approx(np.sqrt(ranges.max()) / 2, rel=1e-3)
+
+
+def test_shear_counts_as_a_mean_in_every_frame() -> None:
+    """Its trace is rounding, whose sign left half of the frames without a mean stress."""
+    shear, turns = np.zeros((3, 3)), Rotation.random(50, random_state=5).as_matrix()
+    shear[0, 1] = shear[1, 0] = 2.0
+    turned = turns @ shear @ turns.transpose(0, 2, 1)
+    stress = np.stack([turned[:, a, b] for a, b in COMPONENTS], axis=1)[..., None]
+    np.testing.assert_allclose(mean_stress(["0"], stress), 2.0 * np.sqrt(3), rtol=ROUNDING)
+    assert not np.signbit(mean_stress(["0"], -0.0 * stress)).any()
+    np.testing.assert_allclose(mean_stress(["0"], stress - 0.1 * (np.arange(6) < 3)[:, None]).max(), -2.0 * np.sqrt(3))
 
 
 def test_mean_has_the_sign_of_its_trace_and_counts_under_tension_alone() -> None:

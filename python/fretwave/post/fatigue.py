@@ -4,7 +4,8 @@ The stress amplitude is the largest von Mises stress of sigma(t) - mean over the
 VIII-2, 5.5.3 (von Mises stress of the difference of two instants), where the motion has odd harmonics alone, and not
 below it otherwise. The mean stress is von Mises' of harmonic 0, with the sign of its trace (D. F. Socie and
 G. B. Marquis, Multiaxial Fatigue, SAE 2000: signed von Mises). Goodman: sigma_a / sigma_e + sigma_m / sigma_u <= 1;
-compression counts as no mean stress (Shigley's Mechanical Engineering Design, chapter on fatigue failure).
+compression counts as no mean stress (Shigley's Mechanical Engineering Design, chapter on fatigue failure). Shear has
+no trace: what a mesh leaves of one must not choose whether it counts, and it does.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ INSTANTS = 64
 #: Largest values that differ by less than this share, which the parabola may err by, are equal: those of the sectors
 #: of a tuned wheel.
 EQUAL = 2e-5
+#: A trace above minus this share of von Mises' stress is that of shear: a twisted bar has up to 1e-3 by its mesh.
+SHEAR = 0.01
 #: Numbers of one block of places over the period.
 BLOCK = 4_000_000
 
@@ -65,7 +68,8 @@ def stress_amplitude(labels: Sequence[str], stress: Array) -> Array:
 def mean_stress(labels: Sequence[str], stress: Array) -> Array:
     """Von Mises stress (n,) of the mean of stresses (n, 6, m), negative where its trace is."""
     still, _, _ = parts(labels, stress)
-    return np.asarray(np.copysign(np.sqrt(von_mises_square(still)), still[:, :3].sum(axis=1)))
+    size = np.sqrt(von_mises_square(still))
+    return np.asarray(np.where(still[:, :3].sum(axis=1) < -SHEAR * size, -size, size))
 
 
 def swing(labels: Sequence[str], values: Array) -> tuple[Array, Array]:

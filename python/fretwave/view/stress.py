@@ -47,7 +47,7 @@ NODE = Column("worst_node", "1", "node of the largest Goodman factor, or of the 
 SECTOR = Column("worst_sector", "1", "sector that it is in", "i")
 STRESS = (
     Column("stress_amplitude", "pressure", "largest von Mises stress there about the mean, over the period"),
-    Column("mean_stress", "pressure", "von Mises stress of the mean there, with the sign of its trace"),
+    Column("mean_stress", "pressure", "von Mises stress of the mean there, with the sign of its trace, of shear +"),
 )
 #: In the row of the largest stress, where there is any: what `agreement` warns of.
 DOUBT = Column("warning", "", "why the stress is not that of the model's stiffness", "s")
