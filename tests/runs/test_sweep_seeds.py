@@ -21,7 +21,7 @@ from fretwave.plots.quantiles import figures
 from fretwave.post.grid import Plan
 from fretwave.post.quantiles import interval_ranks
 from fretwave.results.reader import Run
-from fretwave.results.sweep_quantiles import quantile_lines
+from fretwave.results.sweep_quantiles import quantile_lines, quantile_rows
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -161,6 +161,27 @@ def test_a_sweep_s_values_are_gone_through_as_often_whatever_their_number(groups
         place = f"flutter, friction = {group}, nodal diameter = {wave}, at amplitude {group + wave / 10:g}: zeta_at_1: "
         (line,) = [line for line in lines if line.startswith(place)]
         assert f"50 % {np.median(zeta):.5g} [" in line and line.endswith("(n = 5)")
+
+
+def test_draws_of_seeds_that_are_crossed_have_no_intervals(swept: Path, monkeypatch) -> None:
+    """Of 3 x 4 values 3 or 4 are independent: as those of 12 draws their intervals were too narrow."""
+    plan, zeta = (
+        Plan({"uncertainty.seed": [1, 2, 3], "mode.mistuning.seed": [1, 2, 3, 4]}),
+        Column("zeta_at_1", "1", ""),
+    )
+    table = [{"value": k, "done": 1, "zeta_at_1": 0.01 * (k // 4 + 1)} for k in range(12)]
+    (row,) = quantile_rows(plan, table, [zeta], "")
+    assert (row["value"], row["n"]) == (pytest.approx(0.02), 12)
+    assert np.isnan([row["low"], row["high"]]).all()
+    told = quantile_lines("mode", plan, table, [zeta], "")
+    assert told[0] == "mode: zeta_at_1: 50 % 0.02 [unknown, unknown] (n = 12)"
+    assert "uncertainty.seed and mode.mistuning.seed are crossed" in told[-1]
+    one_wheel = Plan({**plan.over, "uncertainty.seed": [*range(12)], "mode.mistuning.seed": [1]})
+    assert np.isfinite(quantile_rows(one_wheel, table, [zeta], "")[0]["low"])
+    for known in (False, True):
+        monkeypatch.setattr("fretwave.plots.quantiles.crossed", lambda plan, known=known: known)
+        (figure,) = [figure for _, figure in figures(Run(swept))]
+        assert bool(figure.axes[0].collections) != known
 
 
 # A wheel

@@ -16,7 +16,7 @@ from ..columns import PURE, Column
 from ..post.grid import Plan
 from ..post.quantiles import CONFIDENCE, distribution, quantiles
 from ..results.reader import Run
-from ..results.sweep_quantiles import AMPLITUDE_AT, groups_of, over_seeds, range_text
+from ..results.sweep_quantiles import AMPLITUDE_AT, crossed, groups_of, over_seeds, range_text
 from ..results.sweep_summary import COUNTS, columns_in, spread_of, summary_of
 from . import style
 from .swept import Swept, plan_in
@@ -55,13 +55,13 @@ def _varies(column: Column, values: Array) -> bool:
 
 def draw(swept: Swept, shown: list[Column]) -> Figure:
     """A panel for each quantity, a line for each level and combination of the keys that are no seeds."""
-    rows = -(-len(shown) // 2)
+    rows, alone = -(-len(shown) // 2), not crossed(swept.plan)
     figure, axes = style.new_figure(0.9 + 3.0 * rows, rows=rows, columns=min(2, len(shown)), squeeze=False)
     for plane, column in zip(axes.ravel(), shown):
         lines = samples(swept, column.name)
         colours = style.PALETTE if len(lines) <= len(style.PALETTE) else style.shades(len(lines))
         for (name, values), colour in zip(lines, colours):
-            _one(plane, values * (100.0 if _in_percent(column) else 1.0), colour, name)
+            _one(plane, values * (100.0 if _in_percent(column) else 1.0), colour, name, alone)
         plane.xaxis.set_major_locator(MaxNLocator(5))
         plane.set_xlabel(_label(swept, column), fontsize=9.5)
         plane.set_ylabel("Share of the draws")
@@ -69,7 +69,8 @@ def draw(swept: Swept, shown: list[Column]) -> Figure:
     for plane in axes.ravel()[len(shown) :]:
         plane.set_visible(False)
     band = f"{100 * CONFIDENCE:g} % interval, value by value"
-    axes[0, 0].fill_between([], [], color=style.BLUE, alpha=0.2, linewidth=0, label=band)
+    if alone:
+        axes[0, 0].fill_between([], [], color=style.BLUE, alpha=0.2, linewidth=0, label=band)
     style.legend_outside(figure, axes[0, 0], columns=2)
     return figure
 
@@ -107,12 +108,14 @@ def _named(swept: Swept, others: dict[str, Any], part: int, count: int) -> str:
     return ", ".join([*words, f"{count} draws"])
 
 
-def _one(axes: Axes, values: Array, colour: str | tuple[float, ...], name: str) -> None:
-    """Steps at the values with the band of the share, and quantiles with their intervals."""
+def _one(axes: Axes, values: Array, colour: str | tuple[float, ...], name: str, alone: bool) -> None:
+    """Steps at the values; of draws that are independent the band of the share, and quantiles with their intervals."""
     if not len(values):
         return
     ordered, share, low, high = distribution(values)
     axes.step(ordered, share, where="post", color=colour, linewidth=1.4, label=name)
+    if not alone:
+        return
     axes.fill_between(ordered, low, high, step="post", color=colour, alpha=0.2, linewidth=0)
     known = [one for one in quantiles(values) if np.isfinite(one.low + one.high)]
     for one in known:

@@ -30,6 +30,11 @@ def over_seeds(plan: Plan) -> bool:
     return any(is_seed(key) for key in plan.keys)
 
 
+def crossed(plan: Plan) -> bool:
+    """Every draw of one seed with every one of another: as they share draws, the values are not independent."""
+    return sum(is_seed(key) and len(values) > 1 for key, values in plan.over.items()) > 1
+
+
 def groups_of(plan: Plan) -> list[tuple[dict[str, Any], list[int]]]:
     """Each combination of the keys that are no seeds, and the numbers of the values with it: its draws."""
     found: dict[str, tuple[dict[str, Any], list[int]]] = {}
@@ -55,7 +60,8 @@ def parts_in(rows: Sequence[Row], split: str) -> list[Any]:
 def quantile_rows(plan: Plan, rows: Sequence[Row], columns: Sequence[Column], split: str) -> list[dict[str, Any]]:
     """The table: other keys, level or nodal diameter, quantity, unit, q, value, low, high, n, what is left out.
 
-    Left out are the values that failed, stopped, or do not have the quantity, by their numbers in the sweep.
+    Left out are the values that failed, stopped, or do not have the quantity, by their numbers in the sweep. Of seeds
+    that are crossed the intervals, which are those of independent values, are not known.
     """
     found = []
     parts = [{} if part is None else {split: part} for part in parts_in(rows, split)]
@@ -65,7 +71,7 @@ def quantile_rows(plan: Plan, rows: Sequence[Row], columns: Sequence[Column], sp
         mine = by_lead.get(_text(lead, lead), [])
         for column in columns:
             found += [{**lead, **row} for row in _of_quantity(column, numbers, mine)]
-    return found
+    return [{**row, "low": math.nan, "high": math.nan} for row in found] if crossed(plan) else found
 
 
 def _by_lead(plan: Plan, rows: Sequence[Row], keys: Sequence[str]) -> dict[str, list[Row]]:
@@ -116,6 +122,12 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
     if bad:
         shown = "; ".join(bad[:10]) + ("; ..." if bad[10:] else "")
         lines.append(f"{name}: left out, for they failed or stopped early: {len(bad)} of {len(plan)} values: {shown}")
+    if lines and crossed(plan):
+        seeds = " and ".join(key for key in plan.keys if is_seed(key))
+        return [
+            *lines,
+            f"{name}: intervals are those of independent draws, and {seeds} are crossed: sweep over one seed",
+        ]
     short = {row["q"]: row["n"] for row in table if not math.isfinite(row["low"] + row["high"])}
     lines += [
         f"{name}: {n} values are too few for both ends of the interval at q = {q:g}, which take {least_count(q)}"
