@@ -121,6 +121,21 @@ def test_a_level_below_the_lowest_is_said(tmp_path: Path, capfd) -> None:
     assert "Goodman factor 1 below level 40 of the force, the lowest" in capfd.readouterr().out
 
 
+def test_a_level_that_is_largest_at_an_end_of_the_range_has_no_peak(run: Path, tmp_path: Path, capfd) -> None:
+    """Below its resonance at 27.8 Hz a beam that breaks there was told not to reach the limit, without a word."""
+    damped = CASE.replace('"cantilever.py"', '"cantilever.py"\nmass_damping = 6.0')
+    beside = FORCED.replace("[27.3, 28.4]", "[26.0, 27.0]").replace("[0.5, 1.0, 4.0]", "[1.0, 20.0]")
+    folder = solved(tmp_path, damped + MATERIAL + beside)
+    capfd.readouterr()
+    assert call("stress", folder) == 0
+    printed, found = capfd.readouterr().out, table(folder / "forced_goodman.csv")
+    assert found["reached"].tolist() == ["no", "before its first point"]
+    assert found["peak_within"].tolist() == [0, 0]
+    assert printed.count("(at an end of the frequency range: the peak is beyond)") == 2
+    assert re.search(r"1 at level [\d.]+ of the force, or lower: peaks are beyond the frequency range", printed)
+    assert table(run / "forced_goodman.csv")["peak_within"].tolist() == [1, 1, 1]
+
+
 def test_a_gauge_reads_the_strain_of_a_beam(run: Path) -> None:
     found = table(run / "mode_gauges.csv")
     wanted = curvature(0.2) * HEIGHT / 2 * found["amplitude"]

@@ -99,7 +99,8 @@ def _of_level(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         return
     level, lowest = rows[0]["limit_level"], min(rows, key=lambda row: float(row["level"]))
     if np.isfinite(level):
-        yield f"Goodman factor 1 at level {level:.5g} of the force"
+        lower = "" if all(row["peak_within"] for row in rows) else ", or lower: peaks are beyond the frequency range"
+        yield f"Goodman factor 1 at level {level:.5g} of the force{lower}"
     elif lowest["largest_goodman"] >= 1:
         yield f"Goodman factor 1 below level {lowest['level']:g} of the force, the lowest"
 
@@ -111,6 +112,7 @@ def _of_limit(row: Mapping[str, Any], units: Mapping[str, str]) -> str:
     known = [name.removeprefix("limit_") for name in row if name.startswith("limit_")]
     at = f"at_{amplitude_column(known)}"
     largest = f"largest {row['largest_goodman']:.4g} at {row[at]:.5g} {units[at]}{whose_amplitude(known)}"
+    largest += "" if row.get("peak_within", 1) else " (at an end of the frequency range: the peak is beyond)"
     if row["reached"] == YES:
         told = (f"{row[f'limit_{name}']:.6g} {units[f'limit_{name}']}" for name in told_at_limit(known))
         return f"{of}Goodman factor 1 at {', '.join(told)}; {largest}"

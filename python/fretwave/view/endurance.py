@@ -9,7 +9,8 @@ import numpy as np
 
 from ..arrays import Array, Indices
 from ..columns import Column
-from ..post.fatigue import first_reaching
+from ..post.fatigue import EQUAL, first_reaching
+from ..post.largest import largest
 from ..results.overview import amplitude_column
 from ..results.parts import PARTS, rows_of_branches
 from .stress import StressTable
@@ -23,6 +24,8 @@ REACHED = (
 )
 #: Of what else than the amplitude the limit is told, where a table has it.
 BESIDE = ("frequency_hz", "cycles")
+#: Of a frequency response.
+WITHIN = Column("peak_within", "1", "1: the largest factor is a peak; 0: it is at an end of the frequency range", "i")
 LEVEL = Column("limit_level", "1", "level of the force at which the largest factor over frequency is 1")
 
 Row = dict[str, Any]
@@ -42,8 +45,9 @@ def endurance(table: StressTable) -> tuple[list[Column], list[Row]]:
     found += [_renamed(column, "limit", "where the factor is 1") for column in at_limit]
     if "level" in parts:
         level = _limit_level(rows)
-        found.append(LEVEL)
-        rows = [{**row, LEVEL.name: level} for row in rows]
+        found += [LEVEL, WITHIN]
+        within = [_has_peak(table["goodman"][chosen]) for chosen in rows_of_branches(columns)]
+        rows = [{**row, LEVEL.name: level, WITHIN.name: int(inside)} for row, inside in zip(rows, within)]
     return found, rows
 
 
@@ -72,6 +76,11 @@ def _row(columns: Mapping[str, Array], chosen: Indices, parts: list[str]) -> Row
         "reached": BEFORE if before else NO if passed is None else YES,
         **{f"limit_{name}": value for name, value in zip(names, values)},
     }
+
+
+def _has_peak(factor: Array) -> bool:
+    """Whether a response is largest between the ends of its range."""
+    return 0 < largest(factor, EQUAL) < len(factor) - 1
 
 
 def _limit_level(rows: list[Row]) -> float:
