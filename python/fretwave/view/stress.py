@@ -51,6 +51,11 @@ STRESS = (
 )
 #: In the row of the largest stress, where there is any: what `agreement` warns of.
 DOUBT = Column("warning", "", "why the stress is not that of the model's stiffness", "s")
+#: Of a mistuned wheel.
+DEVIATES = (
+    "note: stress has the modulus of [material] in every sector: where a sector's stiffness deviates by its modulus,"
+    " its stress is off by as much"
+)
 GOODMAN = Column("goodman", "1", "Goodman's factor there: amplitude / endurance limit + mean / ultimate strength")
 
 
@@ -192,7 +197,7 @@ def _table(file: h5py.File, folder: Path, case: Case, name: str, reader: Reader)
             {**{key: points[key][k].item() for key in lead}, **_row(reader, scene, at_point(choice, group, case, k))}
             for k in range(len(group["coefficients"]))
         ]
-        notes = scene.note.splitlines()
+        notes = [*scene.note.splitlines(), *(_of_deviations(case, choice) if reader.own is not None else [])]
         warnings: list[str] = []
         if rows and reader.own is not None:
             k = largest(_sizes(rows), EQUAL)
@@ -203,6 +208,12 @@ def _table(file: h5py.File, folder: Path, case: Case, name: str, reader: Reader)
     columns = [*_lead_columns(group, lead), *reader.columns(choice.wheel), *([DOUBT] if warnings else [])]
     rows = [{DOUBT.name: "", **row} for row in rows]
     return StressTable(name, [column.in_units(choice.units) for column in columns], rows, notes)
+
+
+def _of_deviations(case: Case, choice: Choice) -> list[str]:
+    """A note on a mistuned wheel, whose sectors move with their own stiffness and have the stress of one material."""
+    mistuned = choice.wheel and case.analyses[choice.name].whole_wheel()[1] is not None
+    return [DEVIATES] if mistuned else []
 
 
 def _lead_columns(group: h5py.Group, names: Sequence[str]) -> Iterator[Column]:
