@@ -130,6 +130,26 @@ def test_failed_values_are_left_out_and_named_and_other_keys_stay_apart(tmp_path
     assert said in capsys.readouterr().out
 
 
+def test_what_lies_beyond_a_branch_has_no_quantile(tmp_path: Path) -> None:
+    """Slip begins at the drawn limit over kt = 1. Draws that slip throughout or not at all lack it: the others' median
+    was 1.13 with an interval from 0.97 to 1.29, that of all 30 is 0.95."""
+    factor = (
+        'factors.contact.slider.friction_limit = {{ distribution = "lognormal", mean = {}, standard_deviation = {} }}'
+    )
+    case, summary, known = tmp_path / "case.toml", tmp_path / "run" / "summary.csv", []
+    for given in ((1.0, 0.5), (1.1, 0.02)):
+        drawn = "[uncertainty]\n" + factor.format(*given)
+        case.write_text(drawn + CASE.replace("[0.05, 60.0]", "[0.9, 1.4]").replace("samples = 512", "samples = 64"))
+        words = ["--over", "uncertainty.seed=1:6", "--only", "mode", "--no-plots", "--out", tmp_path / "run"]
+        assert call("sweep", case, *words) == 0
+        known.append({row["quantity"] for row in rows(tmp_path / "run" / "mode_quantiles.csv")})
+    slip = {"slip_threshold", "stick_until", "slip_from"}
+    assert "largest_zeta" in known[0] and not slip & known[0]
+    assert slip <= known[1]
+    limit = column(summary, "factors.contact.slider.friction_limit")
+    assert column(summary, "slip_threshold") == pytest.approx(limit, rel=2 * (np.pi / 64) ** 2)
+
+
 def test_draws_at_other_amplitudes_say_theirs(tmp_path: Path, capsys) -> None:
     """Of two values of report_at each has its own; the picture, which has both, says from where to where."""
     (tmp_path / "case.toml").write_text(UNCERTAIN + CASE.replace("60.0", "0.4"))

@@ -102,8 +102,8 @@ class Summary:
     numbered : tuple of Column
         As many as a branch has of each: numbers have names that begin with those of the columns; all of them are shown.
     cut_off : tuple of str
-        Columns that a value lacks where they would be large: quantiles of the others would be too small, and are made
-        where all have them alone.
+        Columns that a value lacks where they would be beyond its branch: quantiles of the others would be too small or
+        too large, and are made where all have them alone.
     note : callable
         What is to be known of all rows beside their words; empty where there is nothing.
     """
@@ -370,8 +370,18 @@ def _forced_note(rows: Sequence[Row]) -> str:
 
 #: Of one dof, where a wheel has the blade that moves most.
 _OF_ONE = tuple(column.name for column in FORCED if column.kind == "f")
+#: Amplitudes of a branch that may lie below or above those that it has.
+_WITHIN_BRANCH = (
+    *("slip_threshold", "stick_until", "slip_from", "onset_amplitude", "amplitude_of_lowest_frequency"),
+    *(f"{word}_limit_cycle" for word in CYCLES),
+)
 MODE_BRANCH = Summary(
-    MODE, _mode, _mode_words, on_wheel=WHEEL_MODE, spread=("largest_zeta", "last_frequency_hz", "largest_amplification")
+    MODE,
+    _mode,
+    _mode_words,
+    on_wheel=WHEEL_MODE,
+    spread=("largest_zeta", "last_frequency_hz", "largest_amplification"),
+    cut_off=_WITHIN_BRANCH,
 )
 FLUTTER_WAVES = replace(MODE_BRANCH, split="nodal_diameter")
 FORCED_LEVELS = Summary(
