@@ -28,9 +28,20 @@ from ..errors import InputError
 from ..post.flutter_waves import DECAYS, STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FLUTTER_WAVES
+from ..texts import counted
 from .mode import point_line
 from .parts.at_rest import flutter_at_rest
-from .parts.branch import continuation, finished_table, mode_problem, notable, open_branch, points_of, record, tell
+from .parts.branch import (
+    continuation,
+    finished_table,
+    largest_error,
+    mode_problem,
+    notable,
+    open_branch,
+    points_of,
+    record,
+    tell,
+)
 from .parts.context import AnalysisContext, Outcome
 from .parts.fed_modes import fed_modes
 from .parts.flutter_wave import in_wave_of, raise_if_all, what_to_do, why_not
@@ -165,10 +176,20 @@ def _all_waves(
     context.entry["waves"] = waves
     unit = context.units("length")
     early = {diameters[number] for number in followed.stopped}
+    told = context.comm.bcast(_in_numbers(table))
     summary = [f"{context.name}: {words(wave, unit, wave['nodal_diameter'] in early)}" for wave in waves]
+    summary += [f"{context.name}: {told}"] if told else []
     goal = f"amplitude {context.analysis.amplitude[1]:g} {unit} in every wave"
     advice = what_to_do(context.name, followed.refused, diameters)
     return Outcome(writer.rows, reason, not followed.stopped, summary, goal, advice)
+
+
+def _in_numbers(table: Mapping[str, Any]) -> str:
+    """Of all waves together: points, the largest error and time; nothing before the first point."""
+    if not table:
+        return ""
+    error = largest_error("zeta", table, "zeta_error", "%", 100)
+    return f"{counted(len(table['zeta']), 'point')},{error} {table['wall_s'].sum():.2f} s"
 
 
 def _beside_other_families(context: AnalysisContext[FlutterAnalysis], wave: Mapping[str, Any]) -> dict[str, Any]:
