@@ -88,6 +88,9 @@ def test_errors_without_the_reduction_s_are_told_as_such(key: str, tmp_path: Pat
     mode, wear = (line for line in capfd.readouterr().out.splitlines() if "error of zeta up to" in line)
     assert ("without the reduction's, which is not known" in mode) == bool(key)
     assert "without the reduction's" not in wear
+    assert call("show", tmp_path / "run") == 0
+    shown = capfd.readouterr().out
+    assert shown.count("% zeta without the reduction's") == bool(key)
 
 
 @pytest.fixture(scope="module")

@@ -116,8 +116,10 @@ class Overview:
     def _error(self) -> str:
         if not self.error:
             return ""
-        value = self.error["value"]
-        return f"{100 * value:.2g} % zeta" if self.error["of"] == "zeta" else f"{value:.2g} {self.error['unit']}"
+        value, lacks = self.error["value"], " without the reduction's" if self.error["without_reduction"] else ""
+        if self.error["of"] == "zeta":
+            return f"{100 * value:.2g} % zeta{lacks}"
+        return f"{value:.2g} {self.error['unit']}{lacks}"
 
     def _cycles(self) -> list[str]:
         return [
@@ -217,8 +219,11 @@ def _error(table: Mapping[str, Any], unit: str) -> dict[str, Any]:
     """The largest estimated one, where there is one."""
     for of, symbol in (("zeta", "1"), ("amplitude", unit)):
         found = table.get(f"{of}_error", np.empty(0))
-        if np.isfinite(found).any():
-            return {"of": of, "value": float(np.nanmax(found)), "unit": symbol}
+        known = np.isfinite(found)
+        if known.any():
+            shares = [values[known] for name, values in table.items() if name.endswith("_error_reduction")]
+            lacks = bool(np.isnan(shares).any())  # the reduction's share, where it is not known
+            return {"of": of, "value": float(np.nanmax(found)), "unit": symbol, "without_reduction": lacks}
     return {}
 
 
