@@ -43,12 +43,13 @@ class Overview:
     range : column, unit, low, high, and `cycles` of wear
     peak : what is largest and where: `point` is the row of the table, all else its columns
     folds : number of them, None of a table without events
-    error : the largest estimated one: column, value, unit
+    error : the largest estimated one: column, value, unit, and whether the reduction's share is not known
     limit_cycles : amplitude, frequency_hz, stable in its own amplitude (None: not known), nodal_diameter where there
         are several waves, fed (other linear modes that gain energy by themselves) of a stable one
     overrides : what the command line changed, as it was typed
     changed : what the case of the last run has in another way, where these results are of an earlier one
     notes : what else is said, in lines
+    peak_beyond : the largest amplitude of a response is at an end of its range
     """
 
     name: str
@@ -67,6 +68,7 @@ class Overview:
     overrides: str = ""
     changed: str = ""
     notes: list[str] = field(default_factory=list)
+    peak_beyond: bool = False
 
     def cells(self) -> tuple[str, ...]:
         """Its row of the table, under `HEADINGS`."""
@@ -110,7 +112,7 @@ class Overview:
         if not top:
             return ""
         sector = f" of sector {top['largest_sector']:.0f}" if "largest_sector" in top else ""
-        beyond = " (at an end of the range: the peak is beyond)" * (not top.get("within", True))
+        beyond = " (at an end of the range: the peak is beyond)" if self.peak_beyond else ""
         return f"a {top[amplitude_column(top)]:.4g} {self.unit}{sector}, {top['frequency_hz']:.4g} Hz{beyond}"
 
     def _error(self) -> str:
@@ -158,6 +160,7 @@ def overview_of(name: str, group: h5py.Group, resolved: Values = MappingProxyTyp
         overrides=str(attributes.get(OVERRIDES, "")),
         changed=changed_since(stamp_of(attributes), resolved),
         notes=_landmarks(name, group),
+        peak_beyond="over" not in group and _peak_beyond(table),
     )
 
 
@@ -206,13 +209,19 @@ def _peak(table: Mapping[str, Any], group: h5py.Group) -> dict[str, Any]:
         *("largest_amplitude", "largest_sector", "frequency_hz", "omega_error"),
     )
     found: dict[str, Any] = {"point": top, **{key: float(table[key][top]) for key in wanted if key in table}}
-    if "level" in table and "over" not in group:  # branches of a sweep's values stand one after the other
-        rows = np.flatnonzero(table["level"] == table["level"][top])
-        found["within"] = bool(rows[0] < top < rows[-1])
     if "cycles" in table:
         factor, found["worn_unit"] = units_of(group.attrs).of_volumes
         found["worn"] = float(factor * np.sum([table[key] for key in table if key.startswith("worn_")], axis=0).max())
     return found
+
+
+def _peak_beyond(table: Mapping[str, Any]) -> bool:
+    """Of a run; in a table of a sweep branches of several values have one level."""
+    top = peak_row(table) if "level" in table else None
+    if top is None:
+        return False
+    rows = np.flatnonzero(table["level"] == table["level"][top])
+    return not rows[0] < top < rows[-1]
 
 
 def _error(table: Mapping[str, Any], unit: str) -> dict[str, Any]:
