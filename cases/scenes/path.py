@@ -103,21 +103,24 @@ def _folds(run: Any) -> list[str]:
     return []
 
 
-def coordinates(run: Any) -> Any:
-    """Rows as points: motion over amplitude, decay and frequency over the first frequency, log amplitude."""
+def coordinates(run: Any, mean: bool = False) -> Any:
+    """Rows as points: motion over amplitude, decay and frequency over the first frequency, log amplitude.
+
+    Of a response with its mean, of a mode without unless it is asked for.
+    """
     c, n = run.columns, len(run.Q)
     if run.method == "forced":
         size = abs(run.Q).max()
         return np.column_stack([run.Q.reshape(n, -1) / size, c["omega"] / c["omega"].mean()])
     first = 1 if run.equations.orders[0] == 0 else 0
-    motion = run.Q[:, :, first:].reshape(n, -1)
-    motion = motion / np.linalg.norm(motion, axis=1, keepdims=True)
+    size = np.linalg.norm(run.Q[:, :, first:].reshape(n, -1), axis=1, keepdims=True)
+    motion = run.Q[:, :, 0 if mean else first :].reshape(n, -1) / size
     return np.column_stack([motion, c["beta"] / c["omega0"][0], c["omega"] / c["omega0"][0], np.log(c["amplitude"])])
 
 
 def retraced(run: Any) -> list[str]:
     """Points that come back along earlier pieces of the branch, the other way."""
-    z = coordinates(run)
+    z = coordinates(run, mean=True)
     rows = np.flatnonzero(np.r_[True, np.linalg.norm(np.diff(z, axis=0), axis=1) > 1e-12])
     z = z[rows]
     count = 0
@@ -148,6 +151,8 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
     start, end, here = near[j - first], near[j - first + 1], run.state(int(rows[i]))
     chord = (end[0] - start[0]).ravel()
     square, beside = chord @ chord, 0.0
+    if square == 0.0:  # rows that rounding alone tells apart
+        return False
     for _ in range(ABREAST):
         found = distance(run.equations, *_by_cubic(near, j - first, along))
         if not found.found:
@@ -156,9 +161,7 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
         missed = (off @ chord) / square
         beside = float(np.linalg.norm(off - chord * missed) / np.sqrt(square))
         along += missed
-        if not -1 < along < 2:  # abreast of another piece, as where the mean moves far and all else comes back
-            return False
-        if abs(missed) < APART:
+        if abs(missed) < APART or not -1 < along < 2:  # beside the chord there is nothing to be solved
             break
     return beside < APART
 
