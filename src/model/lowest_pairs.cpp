@@ -21,7 +21,6 @@ constexpr double tolerance = 1e-13;
 constexpr double resolution = 1e-9;  // relative distance below which eigenvalues count as one
 constexpr PetscInt beyond = 2;       // more than wanted, to find a gap behind them
 constexpr int searches = 5;
-constexpr int farther = 3;      // shifts
 constexpr double widest = 1e6;  // highest eigenvalue over the lowest's distance from a shift that serves both
 
 MPI_Comm comm_of(Mat A) {
@@ -234,25 +233,21 @@ bool is_rigid(Mat K, double scale, double value, Vec vector) {
 
 namespace {
 
-/// The shift is put farther below zero as long as it is lost beside the stiffness of a loose part, one far
-/// lighter than the others.
-Pairs resolved_pairs(Pencil& pencil, PetscInt count) {
-  for (int left = farther;; --left) try {
-      return lowest_pairs(pencil, count);
-    } catch (PetscFailure const& failure) {
-      const bool singular = std::string(failure.what()).find("INFOG(1)=-10") != std::string::npos;
-      if (left == 0 || !singular) throw;
-      pencil.shift *= 1e4;
-    }
+/// Whether no force of K acts on a motion but for rounding. Collective.
+bool loose(Mat K, Vec x) {
+  double work;
+  VecHandle f = like(x);
+  check(MatMult(K, x, f));
+  check(VecDot(x, f, &work));
+  return std::abs(work) <= uncertainty(K, x);
 }
 
-}  // namespace
-
-std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
-  auto found = resolved_pairs(pencil, count);
+Pairs beside_zero(Pencil pencil, PetscInt count) {
   const double far = 100 * std::abs(pencil.shift);
+  auto found = lowest_pairs(pencil, count);
   for (auto& pair : found)  // a loose part without a spring of its own has no rounding to tell it by
-    if (std::abs(pair.value) < 10 * tolerance * std::abs(pencil.shift)) pair.value = 0;
+    if (std::abs(pair.value) < 10 * tolerance * std::abs(pencil.shift) && loose(pencil.K, pair.vector))
+      pair.value = 0;
   const auto wanted = found.begin() + std::min<std::ptrdiff_t>(count, std::ssize(found));
   const auto elastic =
       std::find_if(found.begin(), wanted, [&](auto const& pair) { return pair.value > far; });
@@ -273,6 +268,18 @@ std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
     std::move(again.begin(), again.begin() + soft, found.begin());
   }
   return found;
+}
+
+}  // namespace
+
+std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) try {
+  return beside_zero(pencil, count);
+} catch (PetscFailure const& failure) {
+  if (std::string(failure.what()).find("INFOG(1)=-10") == std::string::npos) throw;
+  throw InputError("the modes of loose parts cannot be told: the stiffness of one hides the mass of another",
+                   "K - (" + short_text(pencil.shift) + " 1/s^2) M is singular to 16 digits",
+                   "parts that are held, or alike in mass and stiffness",
+                   "hold each part that moves freely by a soft spring, or leave it out");
 }
 
 }  // namespace fretwave::model

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import call
 
-from fretwave import Model, linear_modes
+from fretwave import InputError, Model, linear_modes
 from fretwave.analyses.parts.linear_waves import without_rounding
 from fretwave.report.report import report_run
 
@@ -32,13 +32,21 @@ def test_what_rounding_leaves_of_a_loose_body_is_zero(seed: int, unit: float) ->
     assert [mode.omega for mode in found] == pytest.approx([0.0, 0.0, 0.0, *np.sqrt(sorted(springs))], rel=1e-9, abs=0)
 
 
-@pytest.mark.parametrize("heavy", [1e-3, 1.0, 1e3, 1e6])
+@pytest.mark.parametrize("heavy", [1e-3, 1.0])
 def test_a_mass_without_a_spring_beside_a_far_lighter_body(heavy: float) -> None:
     """Its eigenvalue, of no rounding of its own, became a shift next to zero: "-10" of MUMPS."""
     M, K = np.diag([7e-7, 9e-7, heavy]), 290.0 * np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
     exact = np.sqrt(290.0 * (1 / 7e-7 + 1 / 9e-7))
     found = without_rounding(linear_modes(Model(M, K), 3, "free"), K)
     assert [mode.omega for mode in found] == pytest.approx([0, 0, exact], rel=1e-9)
+
+
+def test_loose_parts_that_hide_each_other_are_refused_in_words() -> None:
+    """No modes of a shift that only the heavier of two can bear; of these two one has a mode at 0.0014 rad/s."""
+    M, K = np.diag([1e-6, 1e-6, 1e6, 1e6]), np.zeros((4, 4))
+    K[:2, :2], K[2:, 2:] = ([[k, -k], [-k, k]] for k in (1e8, 1.0))
+    with pytest.raises(InputError, match="loose parts cannot be told"):
+        linear_modes(Model(M, K), 4, "free")
 
 
 @pytest.mark.parametrize("soft", [1e-9, 1e-3, 1.0])
