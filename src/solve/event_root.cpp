@@ -117,7 +117,7 @@ std::optional<Continuation::Trial> Continuation::on(Hermite const& curve, double
   trial.outcome = newton_.as_it_stands(trial.y);
   if (!trial.outcome.converged) return {};
   trial.tangent = curve.derivative(at);
-  normalise(trial);
+  if (!normalise(trial) || !adrift(trial).empty()) return {};
   return trial;
 }
 
