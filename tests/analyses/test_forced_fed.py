@@ -49,3 +49,19 @@ def test_motions_that_grow_beside_a_response_are_those_of_the_closed_form(tmp_pa
     assert found == pytest.approx(expected, rel=1e-6)
     for text in (said, beforehand):
         assert ("whether the responses are stable is not known, but " in text) == bool(expected)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(("across", "fed"), [(0.02, True), (0.005, False)])
+def test_dampers_feed_a_motion_that_no_dof_feeds_alone(tmp_path, capfd, across, fed):
+    """C = [[c, d], [d, c]] damps both dofs and, for d > c, feeds where one moves against the other: zeta is below 0."""
+    path = tmp_path / "case.toml"
+    path.write_text(
+        "[model]\ndofs = ['a', 'b']\nM = [[1.0, 0.0], [0.0, 1.0]]\nK = [[2.0, -1.0], [-1.0, 2.0]]\n"
+        f"C = [[0.01, {across}], [{across}, 0.01]]\n[[contact]]\nname = 'pad'\nlaw = 'jenkins'\npairs = ['a']\n"
+        "tangential_stiffness = 0.5\nfriction_limit = 1.0\n[[analysis]]\nname = 'forced'\ntype = 'forced'\n"
+        "harmonics = 1\nforce = { a = 1.0 }\nlevels = [1e-4]\nfrequency = [0.1, 0.35]\nobserve = 'a'\n",
+        encoding="utf-8",
+    )
+    assert call("run", path, "--out", tmp_path / "run", "--no-plots") == 0
+    assert ("whether the responses are stable is not known, but " in capfd.readouterr().out) is fed

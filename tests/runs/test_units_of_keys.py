@@ -119,3 +119,24 @@ def test_pictures_of_a_swept_key_have_its_unit(swept: tuple[str, Path]) -> None:
     told = [name for name in names if name.startswith("tangential_stiffness_per_area = ")]
     assert len(told) == 3 and all(name.endswith(f" {unit}") for name in told)
     assert "harmonics = 3" in names
+
+
+def test_a_key_that_texts_are_given_has_no_unit(tmp_path: Path, capsys) -> None:
+    """It was told "stiffness.csv" N/m."""
+    case = tmp_path / "case.toml"
+    case.write_text(
+        "[model]\ndofs = ['a', 'b']\nM = [[1.0, 0.0], [0.0, 1.0]]\nK = [[2.0, -1.0], [-1.0, 2.0]]\n[[contact]]\n"
+        "name = 'pads'\nlaw = 'jenkins'\npairs = ['a', 'b']\ntangential_stiffness = 1.0\nfriction_limit = 1.0\n"
+        "[[analysis]]\nname = 'linear'\ntype = 'linear'\nmodes = 2\n",
+        encoding="utf-8",
+    )
+    for name, values in (("one", (0.5, 0.6)), ("two", (0.7, 0.8))):
+        rows = "".join(f"{pair},{value}\n" for pair, value in enumerate(values))
+        (tmp_path / f"{name}.csv").write_text(f"pair,tangential_stiffness [N/m]\n{rows}", encoding="utf-8")
+    key = "contact.pads.tangential_stiffness"
+    words = ["--over", f'{key}="one.csv","two.csv"', "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 0
+    capsys.readouterr()
+    assert call("show", tmp_path / "run") == 0
+    said = capsys.readouterr().out
+    assert 'tangential_stiffness = "two.csv"' in said and '.csv" N' not in said

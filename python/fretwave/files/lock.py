@@ -170,7 +170,7 @@ def _goes_on(pid: Any) -> bool:
     """Whether there is such a process on this host, of anybody."""
     try:
         os.kill(int(pid), 0)
-    except (ProcessLookupError, TypeError, ValueError):
+    except (ProcessLookupError, TypeError, ValueError, OverflowError):
         return False
     except OSError:  # it is another user's
         return True

@@ -1,4 +1,4 @@
-"""What scripts give on every rank and must be the same there: else ranks wait for each other in different calls."""
+"""What scripts give `follow` and `wear` on every rank and must be the same there, or ranks wait for each other."""
 
 from __future__ import annotations
 

@@ -189,13 +189,14 @@ class Sweep:
         return Checked(case.digest, units, case.resolved, case.title, case.name, case.text, names, plugins, keys)
 
     def _key_units(self, case: Case) -> dict[str, str]:
-        """Of the keys that it goes through, as the first value has the case."""
+        """Of the keys that it goes through, as the first value has the case; not of those that texts are given."""
+        texts = {key for values in self.plan.values() for key, value in values.items() if isinstance(value, str)}
         source = Source(case.path, case.text)
         if self.options.quick:
             source.apply_quick()
         for assignment in [*self.options.overrides, *self.plan.overrides()[0]]:
             source.apply_set(assignment)
-        return key_units(source, self.plan.keys, laws(), case.units)
+        return key_units(source, [key for key in self.plan.keys if key not in texts], laws(), case.units)
 
     def _of_units(self, found: Sequence[Checked]) -> list[FretwaveError]:
         """The tables of a sweep are in one system."""

@@ -23,6 +23,12 @@ if TYPE_CHECKING:
     from .wheel_start import Start
 
 
+#: Rows of a damping matrix up to which all its eigenvalues are asked for.
+DENSE = 1000
+#: Of its largest entry, an eigenvalue that is none.
+ROUNDING = 1e-12
+
+
 def with_others(fed: Callable[[], list[dict[str, Any]]], cycles: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Limit cycles, to stable ones added `fed`, the modes beside theirs that gain energy. Collective."""
     if not any(cycle["stable"] for cycle in cycles):
@@ -58,15 +64,24 @@ def fed_beside(context: AnalysisContext[HarmonicSection], start: Start, first: c
 def fed_under_force(context: AnalysisContext[HarmonicSection]) -> list[str]:
     """A line of the modes that gain energy by themselves, beside which steady responses may not last; often none.
 
-    Sought where something may feed them: the flow, or a damper below zero. Collective.
+    Sought where something may feed them: the flow, or dampers. Collective.
     """
     C = context.case.damping_with(context.analysis.dampers)
-    if not (context.analysis.aerodynamics or (C is not None and C.diagonal().min() < 0)):
+    if not (context.analysis.aerodynamics or (C is not None and _may_feed(C))):
         return []
     found = found_of(lambda: _of_any_wave(context))
     context.entry.update(found)
     told = others(found.get("fed", []), found.get("not_looked_at", ""))
     return [f"whether the responses are stable is not known{told}"] if told else []
+
+
+def _may_feed(C: sp.spmatrix) -> bool:
+    """Whether x^T C x is below zero for some x; of large matrices, for one dof."""
+    diagonal = C.diagonal()
+    if diagonal.min() < 0 or len(diagonal) > DENSE:
+        return bool(diagonal.min() < 0)
+    dense = C.toarray()
+    return bool(np.linalg.eigvalsh((dense + dense.T) / 2)[0] < -ROUNDING * abs(dense).max())
 
 
 def _of_any_wave(context: AnalysisContext[HarmonicSection]) -> list[dict[str, Any]]:

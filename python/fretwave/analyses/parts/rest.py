@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Optional
 
 import numpy as np
@@ -87,8 +88,10 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
     if not with_flow_forces(context.analysis):
         return under(context.model, load)
     with still_model(context) as still:
-        displacement = under(still, load).displacement
-    return under(context.model, load + held_by_flow(context, displacement))
+        rest = under(still, load)
+    rest = replace(rest, load=rest.load + held_by_flow(context, rest.displacement))
+    context.model.settle(rest)  # it is not solved for again: with the flow's stiffness there may be another
+    return rest
 
 
 def pressed(contacts: Sequence[Contact], section: PreloadSection) -> bool:
