@@ -94,3 +94,17 @@ def test_a_wave_without_damping_is_asked_for_by_every_analysis(tmp_path, text, m
         return
     with pytest.raises(CaseErrors, match=f"damping of nodal diameters {missing} in"):
         load_case(path)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(
+    "keys",
+    [f"{ACTS}nodal_diameter = 1", f"{ACTS}nodal_diameter = 1\nwheel = true", "nodal_diameter = 1"],
+    ids=["a wave", "a wheel", "no flow"],
+)
+def test_a_mode_in_one_wave_tells_that_others_are_not_looked_at(tmp_path, capfd, keys):
+    path = tmp_path / "case.toml"
+    path.write_text(f"{wheel_of(FLOW)}{MODE.replace('1.0]', '0.3]')}{keys}\n", encoding="utf-8")
+    assert call("run", path, "--out", tmp_path / "run", "--no-plots") == 0
+    told = "against waves of other nodal diameters" in capfd.readouterr().out
+    assert told == (ACTS in keys and "wheel" not in keys)

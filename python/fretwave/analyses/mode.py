@@ -56,6 +56,10 @@ if TYPE_CHECKING:
     from .parts.branch import Describe
 
 
+#: By a flow that acts in a wave of its own on one sector.
+NOT_ANSWERED = "stability of limit cycles against waves of other nodal diameters"
+
+
 @register_analysis
 class ModeAnalysis(HarmonicSection):
     """``type = "mode"``: a nonlinear mode over its amplitude."""
@@ -135,7 +139,7 @@ class ModeAnalysis(HarmonicSection):
         start = start_of(context)
         context.console.line(asymptote_line(context.name, start.mode.omega, start.asymptotes))
         harmonics = retained(context)
-        context.leave_out(harmonics.left_out)
+        context.leave_out([*harmonics.left_out, *([NOT_ANSWERED] if self.aerodynamics and not self.wheel else [])])
         if start.avoid is not None:
             note = uneven_samples(harmonics.samples, context.wheel.sectors, self.nodal_diameter or 0)
             if note is not None and any(isinstance(contact.law, PythonLaw) for contact in context.model.contacts):

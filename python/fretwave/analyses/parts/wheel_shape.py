@@ -135,8 +135,9 @@ def _sector_amplitudes(
 ) -> Complex:
     """Of the observed dof at some points, (points, N), from the coefficients written."""
     sectors = in_every_sector(context.case, dof_of(context.analysis.normalise))
-    labels = [text.decode() for text in writer.group["harmonic"][()]]
-    kept = [writer.group["coefficients"][int(point), sectors] for point in points]
+    group = writer.group
+    labels = [text.decode() for text in group["harmonic"][()]]
+    kept = [group["coefficients"][int(point), sectors] for point in points]
     return np.array([complex_amplitudes(labels, Q)[1] for Q in kept])
 
 
