@@ -284,8 +284,41 @@ void Continuation::arrive(double reached) {
               problem_.parameter_text(goal);
 }
 
-/// All points of the next step in order: events inside it, then its end (or the stop value), after one of
-/// this length at which that was not to be had.
+/// The points of a step in order: events inside it, then its end, unless that is beyond the range.
+void Continuation::fill_batch(Trial&& end, double length, double next_length) {
+  std::string events;
+  if (turned_)
+    events = events_of_corner(end);
+  else
+    locate_events(end, length);
+  ending_ = problem_.beyond(end.y);
+  after_ = {.y = copy(end.y),
+            .tangent = copy(end.tangent),
+            .step = next_length,
+            .index = 0,
+            .wary = wary_,
+            .smooth = foretold(end.y, length),
+            .sign = end.sign};
+  if (!outside(end.y)) emit(std::move(end), length, std::move(events));
+  std::stable_sort(batch_.begin(), batch_.end(),
+                   [](auto const& x, auto const& y) { return x.first < y.first; });
+}
+
+/// Whether the stop value is among them: it is the last one then.
+bool Continuation::stops_in_batch() {
+  const auto stop = std::find_if(batch_.begin(), batch_.end(), [](auto const& x) {
+    return x.second.event == "stop" || x.second.event == reported_stop;
+  });
+  if (stop == batch_.end()) return false;
+  const double value = stop->second.parameter;
+  if (stop->second.event == reported_stop) stop->second.event = "report";
+  batch_.erase(stop + 1, batch_.end());
+  arrive(std::abs(value - low_) < std::abs(value - high_) ? low_ : high_);
+  return true;
+}
+
+/// The next step, after one of length `tried` at which the stop value was not to be had: a long step's
+/// interpolation is too far from the branch; how long a corner's is does not depend on this.
 void Continuation::make_batch(double tried) {
   batch_.clear();
   emitted_ = 0;
@@ -295,33 +328,9 @@ void Continuation::make_batch(double tried) {
   if (!end || been_here(*end)) return;
   const double stepped = MPI_Wtime() - clock_;  // belongs to the last of the batch, not to an event before it
   clock_ += stepped;
-  std::string events;
-  if (turned_)
-    events = events_of_corner(*end);
-  else
-    locate_events(*end, length);
-  ending_ = problem_.beyond(end->y);
-  after_ = {.y = copy(end->y),
-            .tangent = copy(end->tangent),
-            .step = next_length,
-            .index = 0,
-            .wary = wary_,
-            .smooth = foretold(end->y, length),
-            .sign = end->sign};
   const bool gone = outside(end->y);
-  if (!gone) emit(std::move(*end), length, std::move(events));
-  std::stable_sort(batch_.begin(), batch_.end(),
-                   [](auto const& x, auto const& y) { return x.first < y.first; });
-  const auto stop = std::find_if(batch_.begin(), batch_.end(), [](auto const& x) {
-    return x.second.event == "stop" || x.second.event == reported_stop;
-  });
-  if (stop != batch_.end()) {
-    const double value = stop->second.parameter;
-    if (stop->second.event == reported_stop) stop->second.event = "report";
-    batch_.erase(stop + 1, batch_.end());
-    arrive(std::abs(value - low_) < std::abs(value - high_) ? low_ : high_);
-  } else if (gone) {
-    // a long step's interpolation is too far from the branch; how long a corner's is does not depend on this
+  fill_batch(std::move(*end), length, next_length);
+  if (!stops_in_batch() && gone) {
     if (length / 2 >= steps_.minimum && length <= shorter * tried) {
       clock_ -= stepped;
       trail_.forget();
