@@ -242,7 +242,9 @@ bool loose(Mat K, Vec x) {
   return std::abs(work) <= uncertainty(K, x);
 }
 
-Pairs beside_zero(Pencil pencil, PetscInt count) {
+}  // namespace
+
+std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
   const double far = 100 * std::abs(pencil.shift);
   auto found = lowest_pairs(pencil, count);
   for (auto& pair : found)  // a loose part without a spring of its own has no rounding to tell it by
@@ -268,18 +270,6 @@ Pairs beside_zero(Pencil pencil, PetscInt count) {
     std::move(again.begin(), again.begin() + soft, found.begin());
   }
   return found;
-}
-
-}  // namespace
-
-std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) try {
-  return beside_zero(pencil, count);
-} catch (PetscFailure const& failure) {
-  if (std::string(failure.what()).find("INFOG(1)=-10") == std::string::npos) throw;
-  throw InputError("the modes of loose parts cannot be told: the stiffness of one hides the mass of another",
-                   "K - (" + short_text(pencil.shift) + " 1/s^2) M is singular to 16 digits",
-                   "parts that are held, or alike in mass and stiffness",
-                   "hold each part that moves freely by a soft spring, or leave it out");
 }
 
 }  // namespace fretwave::model

@@ -24,7 +24,8 @@ class Trail {
   void add(Vec y, Vec tangent) { steps_.push_back({project(y), project(tangent)}); }
   /// Drops the last one.
   void forget() { steps_.pop_back(); }
-  /// A meeting with an earlier part of the branch, at a point with its unit tangent. Collective.
+  /// A meeting with an earlier part of the branch, at a point with its unit tangent; with the last steps only
+  /// where it passes them backwards. Collective.
   std::optional<Meeting> meeting(Vec y, Vec tangent) const;
   /// Whether the last point is one of those shortly before it, far nearer than the steps since are long, or
   /// the last steps together are far longer than they lead from it.

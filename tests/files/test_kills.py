@@ -182,7 +182,8 @@ def told_to_end(arguments: list[str], ranks: int, number: int, after: str, all_r
     # As Python knows the environment: MPI of this process has added to it what confuses mpirun. A suite in the
     # background ignores SIGINT, and a run started so keeps to that.
     heard = partial(signal.signal, number, signal.SIG_DFL)
-    with subprocess.Popen(command, env={**os.environ}, preexec_fn=heard, **pipes) as process:  # type: ignore[call-overload]
+    patient = {"OMPI_MCA_odls_base_sigkill_timeout": "4"}  # [s] that ranks have to answer, on a machine that is busy
+    with subprocess.Popen(command, env={**os.environ, **patient}, preexec_fn=heard, **pipes) as process:  # type: ignore[call-overload]
         assert process.stdout is not None
         assert any(after in line for line in process.stdout)
         for told in children(process.pid) if all_ranks else [process.pid]:

@@ -166,11 +166,11 @@ def _check_signs(path: Path, holder: dict[str, Any], locked: bool) -> None:
         raise _in_use(path, holder, f"last sign of life {max(silent, 0.0):.0f} s ago; ")
 
 
-def _goes_on(pid: Any) -> bool:
+def _goes_on(pid: object) -> bool:
     """Whether there is such a process on this host, of anybody."""
     try:
-        os.kill(int(pid), 0)
-    except (ProcessLookupError, TypeError, ValueError, OverflowError):
+        os.kill(int(str(pid)), 0)
+    except (ProcessLookupError, ValueError, OverflowError):
         return False
     except OSError:  # it is another user's
         return True

@@ -111,7 +111,7 @@ def linear_modes(
     except PetscError as error:
         if model.comm.size > 1 and not all_ranks_failed(model.comm):
             raise  # of some ranks alone: the others wait in the solver
-        raise _wrong_terms(model) or error from None
+        raise _wrong_terms(model) or _loose_parts(error) or error from None
     shapes = [on_all_ranks(model.comm, re) + 1j * on_all_ranks(model.comm, im) for _, _, re, im in found]
     for _, _, *parts in found:
         for part in parts:
@@ -133,6 +133,18 @@ def _number(count: SupportsIndex) -> int:
         expected = f"1 to {MOST_MODES}"
         raise InputError("modes are asked for by their number", "count", repr(count), expected, "give a number")
     return number
+
+
+def _loose_parts(error: PetscError) -> InputError | None:
+    """MUMPS' -10: beside one part's stiffness the shift below zero, in the scale of all, is rounding."""
+    if "INFOG(1)=-10" not in str(error):
+        return None
+    return InputError(
+        "the modes of loose parts cannot be told: the stiffness of one hides the mass of another",
+        measured="K less a share of M is singular to 16 digits",
+        expected="parts that are held, or alike in mass and stiffness",
+        fix="hold each part that moves freely, and each dof without mass, by a soft spring, or leave it out",
+    )
 
 
 def _wrong_terms(model: Model) -> InputError | None:
