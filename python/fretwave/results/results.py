@@ -108,7 +108,11 @@ class AnalysisWriter:
         if self._new is None:
             self._new = NewResults(self.folder / "results.h5", self.name)
             build_group(self._new.file, self.name, Rows.of(journal_path(self.folder, self.name)))
-        self._new.check()
+        try:
+            self._new.check()
+        except BaseException:  # a file of h5py on one of Python's may not be left open at the end of the process
+            self._discard()
+            raise
         return self._new.file[self.name]
 
     def keep(self, fields: Mapping[str, Field]) -> None:
@@ -247,9 +251,10 @@ class AnalysisWriter:
         """
         if self._ending is None:
             return
-        self.group.attrs.update(self._ending)
+        ending, self._ending = self._ending, None
+        self.group.attrs.update(ending)
         assert self._new is not None
-        new, self._new, self._ending = self._new, None, None
+        new, self._new = self._new, None
         new.publish()
         self._journal.remove()
 
@@ -260,9 +265,12 @@ class AnalysisWriter:
             self._table = -1
         if self._ending is None:
             self._journal.close()
-            if self._new is not None:
-                self._new.discard()
-                self._new = None
+            self._discard()
+
+    def _discard(self) -> None:
+        if self._new is not None:
+            self._new.discard()
+            self._new = None
 
     def go_on(self) -> dict[str, Any] | None:
         """Open the unfinished table of an earlier process, cut back to its last state (writing rank only).
