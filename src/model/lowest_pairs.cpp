@@ -110,6 +110,15 @@ double blur(Pencil const& pencil, EigenPair const& pair) {
   return 2e4 * uncertainty(pencil.K, pair.vector);  // 1e-8 of that
 }
 
+/// Whether K does no work on a motion but for rounding. Collective.
+bool loose(Mat K, Vec x) {
+  double work;
+  VecHandle f = like(x);
+  check(MatMult(K, x, f));
+  check(VecDot(x, f, &work));
+  return std::abs(work) <= uncertainty(K, x);
+}
+
 /// Eigenvalues between the lowest found, or the shift, and a bound. Only those of a structure that is
 /// unstable lie below.
 PetscInt counted_below(Pencil const& pencil, double lambda, Pairs const& found) {
@@ -230,19 +239,6 @@ void expect_stable(Pencil const& pencil, std::vector<EigenPair> const& pairs) {
 bool is_rigid(Mat K, double scale, double value, Vec vector) {
   return value < 1e-9 * scale && value <= uncertainty(K, vector);
 }
-
-namespace {
-
-/// Whether no force of K acts on a motion but for rounding. Collective.
-bool loose(Mat K, Vec x) {
-  double work;
-  VecHandle f = like(x);
-  check(MatMult(K, x, f));
-  check(VecDot(x, f, &work));
-  return std::abs(work) <= uncertainty(K, x);
-}
-
-}  // namespace
 
 std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
   const double far = 100 * std::abs(pencil.shift);

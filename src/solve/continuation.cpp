@@ -284,8 +284,8 @@ void Continuation::arrive(double reached) {
               problem_.parameter_text(goal);
 }
 
-/// The points of a step in order: events inside it, then its end, unless that is beyond the range.
-void Continuation::fill_batch(Trial&& end, double length, double next_length) {
+/// The points of a step in order: events inside it, then its end, unless that is beyond the range (true).
+bool Continuation::fill_batch(Trial&& end, double length, double next_length) {
   std::string events;
   if (turned_)
     events = events_of_corner(end);
@@ -299,13 +299,15 @@ void Continuation::fill_batch(Trial&& end, double length, double next_length) {
             .wary = wary_,
             .smooth = foretold(end.y, length),
             .sign = end.sign};
-  if (!outside(end.y)) emit(std::move(end), length, std::move(events));
+  const bool gone = outside(end.y);
+  if (!gone) emit(std::move(end), length, std::move(events));
   std::stable_sort(batch_.begin(), batch_.end(),
                    [](auto const& x, auto const& y) { return x.first < y.first; });
+  return gone;
 }
 
-/// Whether the stop value is among them: it is the last one then.
-bool Continuation::stops_in_batch() {
+/// Ends with the stop value, if that is among them: whether it is.
+bool Continuation::arrive_in_batch() {
   const auto stop = std::find_if(batch_.begin(), batch_.end(), [](auto const& x) {
     return x.second.event == "stop" || x.second.event == reported_stop;
   });
@@ -328,9 +330,8 @@ void Continuation::make_batch(double tried) {
   if (!end || been_here(*end)) return;
   const double stepped = MPI_Wtime() - clock_;  // belongs to the last of the batch, not to an event before it
   clock_ += stepped;
-  const bool gone = outside(end->y);
-  fill_batch(std::move(*end), length, next_length);
-  if (!stops_in_batch() && gone) {
+  const bool gone = fill_batch(std::move(*end), length, next_length);
+  if (!arrive_in_batch() && gone) {
     if (length / 2 >= steps_.minimum && length <= shorter * tried) {
       clock_ -= stepped;
       trail_.forget();

@@ -118,8 +118,8 @@ class Continuation {
   std::optional<Trial> step(double& length, double& next_length);
   void finish(std::string reason, bool converged);
   Point point(Trial&&, std::string event, double step);
-  void fill_batch(Trial&& end, double length, double next_length);
-  bool stops_in_batch();
+  bool fill_batch(Trial&& end, double length, double next_length);
+  bool arrive_in_batch();
   void make_batch(double tried = INFINITY);
   bool outside(Vec y) const;
   void arrive(double reached);

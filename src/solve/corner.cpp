@@ -1,4 +1,5 @@
 #include <cmath>
+#include <utility>
 
 #include "lapack.h"
 #include "solve/continuation.h"
@@ -47,6 +48,13 @@ const Tuned meets("branch_meets", 0.1, "of the piece behind a corner: by which i
 }  // namespace
 
 namespace {
+
+/// Shares r and s of two directions in what lies nearest to a vector, from their products with each other
+/// (aa, ab, bb) and with it (a, b).
+std::pair<double, double> shares(double aa, double ab, double bb, double a, double b) {
+  const double turned = aa * bb - ab * ab;
+  return {(bb * a - ab * b) / turned, (aa * b - ab * a) / turned};
+}
 
 /// Of the determinant of n columns, 0 if they are singular.
 int sign_of(std::vector<double> dense, int n) {
@@ -114,9 +122,8 @@ int Continuation::orientation(Vec y, Vec tangent, double cosine) {
 bool Continuation::beyond_corner(Trial const& trial) const {
   const VecHandle chord = moved(trial.y, -1, anchor_.y), row = weighted(weights_, trial.tangent);
   const double across = dot(row_, trial.tangent), square = dot(row, trial.tangent),
-               along_first = dot(row_, chord), along = dot(row, chord), turned = square - across * across;
-  const double s = (along - across * along_first) / turned,
-               r = (square * along_first - across * along) / turned;
+               turned = square - across * across;
+  const auto [r, s] = shares(1, across, square, dot(row_, chord), dot(row, chord));
   check(VecAXPY(chord, -r, anchor_.tangent));
   check(VecAXPY(chord, -s, trial.tangent));
   return s > 0 && r >= -meets * s && weighted_norm(weights_, chord) <= meets * s * std::sqrt(turned);
@@ -127,11 +134,11 @@ bool Continuation::beyond_corner(Trial const& trial) const {
 bool Continuation::straight_there(Trial const& trial, int sign) const {
   const VecHandle chord = moved(trial.y, -1, anchor_.y);
   Vec first = anchor_.tangent, second = trial.tangent;
-  const double a = dot(first, first), b = dot(first, second), c = dot(second, second), p = dot(first, chord),
-               q = dot(second, chord), turned = a * c - b * b, slack = lies_back * norm(chord);
-  if (!(turned > no_corner * a * c)) return p >= 0;
-  const double along_first = (c * p - b * q) / turned, along = (a * q - b * p) / turned;
-  return along_first * std::sqrt(a) >= -slack && sign * along * std::sqrt(c) >= -slack;
+  const double one = dot(first, first), both = dot(first, second), other = dot(second, second),
+               ahead = dot(first, chord), slack = lies_back * norm(chord);
+  if (!(one * other - both * both > no_corner * one * other)) return ahead >= 0;
+  const auto [r, s] = shares(one, both, other, ahead, dot(second, chord));
+  return r * std::sqrt(one) >= -slack && sign * s * std::sqrt(other) >= -slack;
 }
 
 /// Whether a trial's tangent runs against the branch: an older piece of it, or another branch, as a sheet

@@ -243,8 +243,7 @@ Outcome Newton::solve_past_kinks(Vec y) {
   Outcome out = solve_persistently(y);
   check(SNESGetLineSearch(snes_, &search));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(search), SNESLINESEARCHBT, &backtracks));
-  const bool persists = effort_ == Effort::full || effort_ == Effort::rough;
-  if (!past_kinks_ || !persists || out.converged || out.linear_failure || !backtracks ||
+  if (!past_kinks_ || effort_ < Effort::full || out.converged || out.linear_failure || !backtracks ||
       !std::isfinite(out.residual))
     return out;
   check(VecCopy(guess, y));
