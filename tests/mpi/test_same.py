@@ -54,6 +54,8 @@ def test_ranks_that_go_to_different_ends_do_not_wait_for_each_other(comm: MPI.Co
         fw.follow(mode, 0.1, 4.0, report_at=[0.5] if first else [])
     with pytest.raises(InputError, match=r"0\.1 on rank 0, 0\.2 on rank 1"):
         fw.follow(mode, 0.1, 4.0, steps=fw.StepControl(maximum=0.1 if first else 0.2))
+    with pytest.raises(InputError, match="4 on rank 0, 1 on rank 1"):
+        fw.Continuation(mode, mode.initial(0.1), (0.1, 4.0 if first else 1.0))
     branch = fw.follow(mode, 0.1, 4.0)
     with pytest.raises(InputError, match="cycles and reports of wear"):
         fw.wear(branch, 2.0, 1e-3, {}, 10.0 if first else 20.0)

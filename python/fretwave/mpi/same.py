@@ -1,4 +1,4 @@
-"""What scripts give `follow` and `wear` on every rank and must be the same there, or ranks wait for each other."""
+"""What scripts give on every rank for a branch or its wear and must be the same there, or ranks wait for each other."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..given import listed, with_a_square
 from ..hb.harmonic_problem import HarmonicProblem
 from ..kinds import of_their_kinds
 from ..mpi.log import event
+from ..mpi.same import expect_same
 from ..mpi.spread import Cuttable, Spread, fill
 from ..texts import shortened
 from .starting import far_from_start, given, starts
@@ -119,11 +120,13 @@ class Continuation:
             raise InputError(
                 "the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values"
             )
+        control, reports = steps or StepControl(), reports_of(report_at)
+        ways = 0.0 if upwards is None else 2.0 * upwards - 1.0
+        asked = [*stop, ways, *astuple(control), *reports]
+        expect_same(problem.model.comm, "the ends, reports and steps of a branch", asked)
         with_a_square("an end of the branch", max(1.0, *(end for end in stop if end < np.inf)), "choose other units")
         self.problem, self._y0, self._low, self._high = problem, y0, low, high
-        self._core = _core.Continuation(
-            problem.core, problem.prefix, low, high, (steps or StepControl()).core(), reports_of(report_at)
-        )
+        self._core = _core.Continuation(problem.core, problem.prefix, low, high, control.core(), reports)
         if way:
             self._core.follow_as_way()
         if upwards is None:

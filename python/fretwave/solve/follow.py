@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -110,9 +109,8 @@ def follow(
     first = problem.parameter(start) if own else float(numbers("start", start))
     y0: PETSc.Vec = start if own else problem.initial(first)
     low, high, upwards = _range(first, stop)
-    reports, lengths = reports_of(report_at), astuple(steps or StepControl())
-    asked = [low, high, 0.0 if upwards is None else 2.0 * upwards - 1.0, accuracy or 0.0, errors, unknowns]
-    expect_same(problem.model.comm, "the ends, reports and steps of a branch", [*asked, *lengths, *reports])
+    reports = reports_of(report_at)
+    expect_same(problem.model.comm, "accuracy, errors and unknowns of a branch", [accuracy or 0.0, errors, unknowns])
     settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": reports, "upwards": upwards}
     if accuracy is None:
         continuation = Continuation(problem, y0, **settings)
