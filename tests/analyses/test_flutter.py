@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from models.cyclic_models import chain_crossings
+from models.flow_chain import OMEGA, SECTORS, wheel_of
 from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
@@ -23,30 +24,9 @@ from fretwave.results.reader import Run
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import resume_run, run_case
 
-SECTORS, OMEGA = 5, 1.7
 INFLUENCE = {0: 0.02 - 0.06j, 1: -0.1 + 0.02j, -1: 0.12 + 0.05j, 2: 0.01 - 0.005j}
 #: The chain as a case: a mass on its ground spring, a Jenkins element to the next one, and the flow.
-TEXT = f"""
-[model]
-dofs = ["mass", "next"]
-M = [[1.0, 0.0], [0.0, 0.0]]
-K = [[1.0, 0.0], [0.0, 0.0]]
-sectors = {SECTORS}
-low = ["mass"]
-high = ["next"]
-
-[[contact]]
-name = "between"
-law = "jenkins"
-pairs = [["mass", "next"]]
-tangential_stiffness = 1.0
-friction_limit = 1.0
-
-[aerodynamics]
-frequency = {OMEGA / (2 * np.pi)!r}
-dof = "mass"
-influence = {{ {", ".join(f"{k} = [{L.real}, {L.imag}]" for k, L in INFLUENCE.items())} }}
-
+TEXT = f"""{wheel_of(INFLUENCE, dof="mass")}
 [[analysis]]
 name = "flutter"
 type = "flutter"

@@ -7,16 +7,20 @@ import numpy as np
 SECTORS, OMEGA, LIMIT = 5, 1.7, 1.0
 
 
-def wheel_of(influence: dict[int, complex], damper: float = 0.0, spin: float = 0.0) -> str:
-    """TOML of the model; `damper` holds each mass to the ground, `spin` [N s/m] is gyroscopic between neighbours."""
+def wheel_of(influence: dict[int, complex], damper: float = 0.0, spin: float = 0.0, dof: str = "") -> str:
+    """TOML of the model; `damper` holds each mass to the ground, `spin` [N s/m] is gyroscopic between neighbours.
+
+    The flow acts on one dof, if it is named.
+    """
     flow = ", ".join(f"{k} = [{L.real}, {L.imag}]" for k, L in influence.items())
+    C = f"C = [[{damper}, {spin}], [{-spin}, 0.0]]\n" if damper or spin else ""
+    place = f'dof = "{dof}"\n' if dof else ""
     return f"""
 [model]
 dofs = ["mass", "next"]
 M = [[1.0, 0.0], [0.0, 0.0]]
 K = [[1.0, 0.0], [0.0, 0.0]]
-C = [[{damper}, {spin}], [{-spin}, 0.0]]
-sectors = {SECTORS}
+{C}sectors = {SECTORS}
 low = ["mass"]
 high = ["next"]
 
@@ -29,7 +33,7 @@ friction_limit = {LIMIT}
 
 [aerodynamics]
 frequency = {OMEGA / (2 * np.pi)!r}
-influence = {{ {flow} }}
+{place}influence = {{ {flow} }}
 """
 
 
