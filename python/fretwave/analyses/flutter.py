@@ -23,7 +23,7 @@ from ..case.flow import check_damped
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, label_of
 from ..columns import FLUTTER
-from ..cyclic.engine_order import folded
+from ..cyclic.engine_order import folded, waves_of
 from ..errors import InputError
 from ..post.flutter_waves import DECAYS, STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
@@ -84,7 +84,7 @@ class FlutterAnalysis(HarmonicSection):
         """Nodal diameters that it looks at: those it names, or all forward and backward waves."""
         if self.nodal_diameters is not None:
             return list(self.nodal_diameters)
-        return list(range(-((sectors - 1) // 2), sectors // 2 + 1))
+        return waves_of(sectors)
 
     def kept_dofs(self) -> list[str]:
         return [*super().kept_dofs(), *dofs_of(self.normalise)]

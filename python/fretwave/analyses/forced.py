@@ -35,7 +35,7 @@ from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of, wave_of_forces
 from .parts.forced_peaks import curves_of, write_peaks
 from .parts.observed import keep_row, named
-from .parts.others import fed_under_force
+from .parts.others import fed_under_force, in_other_waves
 from .parts.rest import keep_pairs, retained
 from .parts.several import ending_of, stopped_before, with_stopped
 from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
     from ..case.reporter import Reporter
     from ..hb.harmonic_problem import HarmonicProblem
     from ..units import UnitSystem
-
-
-NOT_ANSWERED = "stability of the responses against waves of other nodal diameters"
 
 
 @register_analysis
@@ -189,9 +186,9 @@ class ForcedAnalysis(HarmonicSection):
         harmonics = retained(context)
         excitation = excitation_of(context, harmonics)
         left_out = [] if self.time_points else ["check by time integration (time_points = 0)"]
-        if self.aerodynamics and not self.wheel:
-            left_out.append(NOT_ANSWERED)
-        context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
+        context.leave_out(
+            [*harmonics.left_out, *_missing_backbones(context), *left_out, *in_other_waves(self, "the responses")]
+        )
         writer = context.writer(
             self.columns_of([*named(FORCED[:-1], self.observe), *excitation.columns(), FORCED[-1]]),
             labels=harmonics.labels,

@@ -40,7 +40,7 @@ from .parts.branch import (
 )
 from .parts.context import AnalysisContext, Outcome
 from .parts.observed import keep_row, named
-from .parts.others import fed_beside, with_others
+from .parts.others import fed_beside, in_other_waves, with_others
 from .parts.rest import keep_pairs, retained
 from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, nearly_tuned, one_by_one
 from .parts.wheel_start import Start, start_of, uneven_samples
@@ -54,10 +54,6 @@ if TYPE_CHECKING:
     from ..solve.continuation import Continuation, Point
     from ..units import UnitSystem
     from .parts.branch import Describe
-
-
-#: By a flow that acts in a wave of its own on one sector.
-NOT_ANSWERED = "stability of limit cycles against waves of other nodal diameters"
 
 
 @register_analysis
@@ -139,7 +135,7 @@ class ModeAnalysis(HarmonicSection):
         start = start_of(context)
         context.console.line(asymptote_line(context.name, start.mode.omega, start.asymptotes))
         harmonics = retained(context)
-        context.leave_out([*harmonics.left_out, *([NOT_ANSWERED] if self.aerodynamics and not self.wheel else [])])
+        context.leave_out([*harmonics.left_out, *in_other_waves(self, "limit cycles")])
         if start.avoid is not None:
             note = uneven_samples(harmonics.samples, context.wheel.sectors, self.nodal_diameter or 0)
             if note is not None and any(isinstance(contact.law, PythonLaw) for contact in context.model.contacts):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional
 from pydantic import ConfigDict, model_validator
 
 from ..columns import with_discretisation
+from ..cyclic.engine_order import waves_of
 from ..texts import toml
 from .analysis import AnalysisSection
 from .analysis_tables import MistuningSection, StepSection
@@ -119,7 +120,7 @@ class HarmonicSection(AnalysisSection):
     def _moving(self, sectors: int) -> list[int]:
         """Nodal diameters of the waves that its motion is made of: of a mistuned wheel all."""
         if self.mistuning is not None:
-            return list(range(-((sectors - 1) // 2), sectors // 2 + 1))
+            return waves_of(sectors)
         return [] if self.nodal_diameter is None else [self.nodal_diameter]
 
     def least_memory(self, facts: Facts) -> Mapping[str, float]:

@@ -21,6 +21,11 @@ def folded(number: int, sectors: int) -> int:
     return place - around if 2 * place > around else place
 
 
+def waves_of(sectors: int) -> list[int]:
+    """Nodal diameters of all waves of a wheel, -N/2 < ND <= N/2, ascending."""
+    return list(range(-((sectors - 1) // 2), sectors // 2 + 1))
+
+
 def speed_rpm(omega: float, order: int) -> float:
     """Speed [rev/min] at which the engine order excites the angular frequency [rad/s]."""
     return 30 * omega / (math.pi * abs(order))

@@ -75,11 +75,16 @@ def fed_under_force(context: AnalysisContext[HarmonicSection]) -> list[str]:
     return [f"whether the responses are stable is not known{told}"] if told else []
 
 
+def in_other_waves(analysis: HarmonicSection, what: str) -> list[str]:
+    """What an analysis of one sector leaves out under the flow, which acts in its own wave alone."""
+    one_wave = analysis.aerodynamics and not analysis.wheel
+    return [f"stability of {what} against waves of other nodal diameters"] if one_wave else []
+
+
 def _may_feed(C: sp.spmatrix) -> bool:
     """Whether x^T C x is below zero for some x; of large matrices, for one dof."""
-    diagonal = C.diagonal()
-    if diagonal.min() < 0 or len(diagonal) > DENSE:
-        return bool(diagonal.min() < 0)
+    if C.diagonal().min() < 0 or C.shape[0] > DENSE:
+        return bool(C.diagonal().min() < 0)
     dense = C.toarray()
     return bool(np.linalg.eigvalsh((dense + dense.T) / 2)[0] < -ROUNDING * abs(dense).max())
 
