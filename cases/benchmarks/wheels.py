@@ -87,12 +87,17 @@ def blisk(sectors: int, cells: int) -> tuple[fw.Sector, int]:
     return sector, int(np.searchsorted(np.setdiff1d(np.arange(mesh.n_dof), dofs[1]), tip))
 
 
-def follow(problem: Any, options: argparse.Namespace) -> dict[str, Any]:
-    """A branch of a few points through slip; cost per point, and the values at its end."""
+def follow(problem: Any, options: argparse.Namespace, y0: Any = None, way: float = 0.0) -> dict[str, Any]:
+    """A branch of a few points through slip; cost per point, and the values at its end.
+
+    `y0` : first guess, found within `way` seconds; without it the linear mode.
+    """
     steps = fw.StepControl(initial=0.3, maximum=0.3)
-    branch = fw.Continuation(problem, problem.initial(options.start), (options.start, options.stop), steps)
-    seconds, newton, linear, began = [], 0, 0, time.process_time()
+    guess = problem.initial(options.start) if y0 is None else y0
+    branch = fw.Continuation(problem, guess, (options.start, options.stop), steps)
+    seconds, newton, linear, began, first = [], 0, 0, time.process_time() - way, None
     for point in branch:
+        first = first or point.y
         seconds.append(COMM.allreduce(time.process_time() - began, MPI.MAX))
         newton, linear, state = newton + point.newton, linear + point.linear, problem.state(point.y)
         slip = problem.diagnostics(point.y)["slip"]
@@ -104,7 +109,8 @@ def follow(problem: Any, options: argparse.Namespace) -> dict[str, Any]:
     branch.destroy()
     cost = {"seconds": sum(seconds) / len(seconds), "points": len(seconds), "newton": newton}
     cost["behind"] = sum(seconds[1:]) / max(1, len(seconds) - 1)  # the first has the way up to it from stick
-    return {**cost, "gmres": linear / max(1, newton), "slip": slip, "state": state, "reason": text}
+    found = {"slip": slip, "state": state, "reason": text, "first": first, "way": seconds[0]}
+    return {**cost, "gmres": linear / max(1, newton), **found}
 
 
 def compared(sector: fw.Sector, tip: int, diameters: int, linear_mode: int, options: argparse.Namespace) -> float:
@@ -116,18 +122,12 @@ def compared(sector: fw.Sector, tip: int, diameters: int, linear_mode: int, opti
         rest = balanced(model, stuck)
         problem.preload(rest.displacement, rest.load)
         alone = follow(problem, options)
+        whole = around(sector, tip, problem, rest, alone, diameters, options)
         problem.destroy()
-    began = time.process_time()
-    wheel = sector.wheel(COMM)
-    say(f"wheel made in {time.process_time() - began:.0f} s, {memory_gb():.1f} GB")
-    start = sector.around(stuck, diameters)
-    PETSc.Options()["wheel_route"] = "krylov"
-    problem = fw.NonlinearMode(wheel, harmonics, "CNM", tip, start, "wheel_", start.shape - 1j * start.imaginary)
-    problem.preload(np.tile(rest.displacement, sector.sectors), np.tile(rest.load, sector.sectors))
-    whole = follow(problem, options)
     apart = [abs(whole["state"][key] / alone["state"][key] - 1) for key in ("omega", "beta")]
+    unknowns = sector.sectors * sector.n_dof * harmonics.block_size
     say(
-        f"{sector.sectors} sectors of {sector.n_dof} dofs, {wheel.n_dof * harmonics.block_size} unknowns,"
+        f"{sector.sectors} sectors of {sector.n_dof} dofs, {unknowns} unknowns,"
         f" {COMM.size} ranks: {whole['points']} points to {100 * whole['slip']:.0f} % slip,"
         f" {whole['seconds']:.3f} s a point,"
         f" {whole['behind']:.3f} s behind the first ({whole['newton']} Newton steps, {whole['gmres']:.1f} GMRES each),"
@@ -136,6 +136,23 @@ def compared(sector: fw.Sector, tip: int, diameters: int, linear_mode: int, opti
         f" apart from the sector: omega {apart[0]:.0e}, beta {apart[1]:.0e}; {whole['reason']}"
     )
     return float(whole["seconds"])
+
+
+def around(
+    sector: fw.Sector, tip: int, one: Any, rest: fw.Rest, alone: dict[str, Any], diameters: int, options: Any
+) -> dict[str, Any]:
+    """The wheel's branch, from where its sector's begins or (--own-way) from its own linear mode. Collective."""
+    began = time.process_time()
+    wheel = sector.wheel(COMM)
+    say(f"wheel made in {time.process_time() - began:.0f} s, {memory_gb():.1f} GB")
+    start = sector.around(one.start, diameters)
+    PETSc.Options()["wheel_route"] = "krylov"
+    avoided = start.shape - 1j * start.imaginary
+    problem = fw.NonlinearMode(wheel, one.harmonics, "CNM", tip, start, "wheel_", avoided)
+    problem.preload(np.tile(rest.displacement, sector.sectors), np.tile(rest.load, sector.sectors))
+    if options.own_way:
+        return follow(problem, options)
+    return follow(problem, options, fw.around_wheel(problem, one, alone["first"], diameters), alone["way"])
 
 
 def one(options: argparse.Namespace) -> None:
@@ -178,6 +195,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=144)
     parser.add_argument("--start", type=float, default=2e-5, help="[m]")
     parser.add_argument("--stop", type=float, default=2e-4, help="[m]")
+    parser.add_argument("--own-way", action="store_true", help="the wheel goes up to its first point by itself")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
     {"growth": growth, "one": one, "ranks": ranks}[options.what](options)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .columns import Column
     from .commands.main import main
     from .cyclic.aerodynamics import Aerodynamics
+    from .cyclic.around_wheel import around_wheel
     from .cyclic.faces import match_faces
     from .cyclic.reduction import SectorReduction, reduce_sector
     from .cyclic.sector import Sector
@@ -77,6 +78,7 @@ _HOMES = {
     "results.reader": ("Run", "open_run"),
     "results.results": ("has_results", "open_results"),
     "cyclic.aerodynamics": ("Aerodynamics",),
+    "cyclic.around_wheel": ("around_wheel",),
     "model.pair_coordinates": ("on_pair_coordinates",),
     "model.pairs": ("Pairs",),
     "model.sectors": ("by_sector", "rotation"),
@@ -162,6 +164,7 @@ __all__ = [
     "WearPoint",
     "WheelShape",
     "WornMode",
+    "around_wheel",
     "balanced",
     "build_model",
     "by_sector",

@@ -124,6 +124,21 @@ def dense_wheel(deviations):
     return np.sqrt(square), shapes
 
 
+@pytest.mark.ranks(1, 2)
+@pytest.mark.parametrize("keys", [WHEEL, WHEEL.replace("2", "-2"), WHEEL + "\nsector = 4"], ids=["on", "back", "other"])
+def test_a_tuned_wheel_begins_where_one_sector_does(comm, tmp_path, keys):
+    """In slip, without a way of its own: Newton has nothing left to do there."""
+    keys_of = {"sector": "nodal_diameter = 2", "wheel": keys}
+    short = [f"{name}.{key}" for name in keys_of for key in ("amplitude=[2e-4,1e-3]", "report_at=[5e-4]")]
+    found, out = run(comm, tmp_path, *short, **keys_of)
+    first = {name: {key: values[0] for key, values in rows.items()} for name, rows in found.items()}
+    assert first["wheel"]["newton"] <= 1 and first["wheel"]["slip"] > 0.2
+    for key in ("amplitude", "omega", "beta"):
+        assert first["wheel"][key] == pytest.approx(first["sector"][key], rel=SOLVED)
+    if comm.rank == 0:
+        assert "on one sector the mode was followed" in (out / "run.log").read_text()
+
+
 @pytest.mark.ranks(1, 2, 3, 4)
 def test_tuned_wheel_follows_its_sector(comm, tmp_path):
     """omega and beta to 1e-8 on any number of ranks, forward and backward; the unfolding vanishes."""

@@ -56,6 +56,46 @@ def test_the_wheel_follows_the_branch_of_its_sector(comm, method):
         assert max(one.state(p.y)["zeta"] for p in reported(one)) > 0.01
 
 
+def first(problem, amplitude):
+    """The branch's first point."""
+    return next(fw.Continuation(problem, problem.initial(amplitude), (amplitude, 1e-2)))
+
+
+@pytest.mark.ranks(1, 2, 3)
+@pytest.mark.parametrize(
+    ("method", "diameters", "dof"), [("CNM", 2, 2), ("EPMC", -1, 14), ("CNM", 0, 5), ("CNM", 3, 2)]
+)
+def test_the_motion_of_the_sector_solves_the_equations_of_the_wheel(comm, method, diameters, dof):
+    """In slip, whichever sector is normalised, on a wave that runs either way or stands still (0, N/2)."""
+    sector = rubbing_blisk()
+    with sector.model(diameters, comm) as model, sector.wheel(comm) as wheel:
+        stuck, harmonics = fw.linear_modes(model, 1)[0], fw.Harmonics(ORDERS, SAMPLES)
+        one = fw.NonlinearMode(model, harmonics, method, 2, stuck)
+        start, other = fw.travelling_wave(stuck, diameters, SECTORS)
+        around = fw.NonlinearMode(wheel, harmonics, method, dof, start, "wheel_", other)
+        point = first(one, 1.3e-4)
+        y = fw.around_wheel(around, one, point.y, diameters)
+        assert one.diagnostics(point.y)["slip"] > 0.1
+        assert around.residual(y).norm() < SOLVED * around.residual(around.initial(1.3e-4)).norm()
+        assert around.state(y) == pytest.approx(one.state(point.y), rel=ROUNDING)
+        c, s = around.scalars(y)[3:5]
+        assert (c, s) == pytest.approx((1.0, 0.0), abs=ROUNDING)
+
+
+def test_what_is_no_wheel_of_the_sector_is_refused(comm):
+    sector, harmonics = rubbing_blisk(), fw.Harmonics(ORDERS, SAMPLES)
+    with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
+        one = fw.NonlinearMode(model, harmonics, "CNM", 2)
+        other = unfolded(wheel, sector.around(one.start, DIAMETERS), "EPMC")
+        with pytest.raises(fw.InputError, match="other method"):
+            fw.around_wheel(other, one, one.initial(1e-5), DIAMETERS)
+        few = fw.NonlinearMode(model, fw.Harmonics([1], 8), "EPMC", 2)
+        with pytest.raises(fw.InputError, match="other harmonics"):
+            fw.around_wheel(other, few, few.initial(1e-5), DIAMETERS)
+        with pytest.raises(fw.InputError, match="not made of such sectors"):
+            fw.around_wheel(one, unfolded(wheel, sector.around(one.start, DIAMETERS)), one.initial(1e-5), DIAMETERS)
+
+
 def test_a_wave_of_the_sector_starts_the_wheel(comm):
     """Unit modal mass of the wheel, the sector's frequency, and no component on the wave running the other way."""
     sector = rubbing_blisk()

@@ -42,6 +42,7 @@ from .parts.context import AnalysisContext, Outcome
 from .parts.observed import keep_row, named
 from .parts.others import fed_beside, in_other_waves, with_others
 from .parts.rest import keep_pairs, retained
+from .parts.wheel_guess import from_one_sector
 from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, nearly_tuned, one_by_one
 from .parts.wheel_start import Start, start_of, uneven_samples
 
@@ -169,7 +170,8 @@ def _follow(
     error_at = reduction.error_at if reduction is not None and estimated else None
     reports = sorted({*analysis.report_at, *([] if error_at is None else [error_at])})
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
-    branch = continuation(context, problem, (low, high), reports, snapshot, found)
+    guess = None if found else from_one_sector(context, problem, start)
+    branch = continuation(context, problem, (low, high), reports, snapshot, found, guess=guess)
     around = None
     if context.case.wheel is not None:
         tuned = start.attributes["tuned_amplitude"]

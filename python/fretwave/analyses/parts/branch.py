@@ -169,29 +169,29 @@ def continuation(
     snapshot: Mapping[str, Any] | None,
     go_on: bool,
     name: str = "",
+    guess: Optional[PETSc.Vec] = None,
 ) -> Continuation:
     """The branch of an analysis from its first end, or on from a snapshot. Collective.
 
     Parameters
     ----------
     name : of the branch, in the log, where an analysis has several
+    guess : of its first point, if it is not the problem's own
     """
     from ...solve.continuation import Continuation
     from ...solve.refining import RefiningContinuation
 
     analysis, name = context.analysis, name or context.name
     settings: dict[str, Any] = {"stop": ends, "steps": step_control(analysis.step), "report_at": list(report_at)}
-    kept = None if snapshot is None else dict(snapshot)
+    kept, y0 = None if snapshot is None else dict(snapshot), None
+    if not go_on:
+        y0 = problem.initial(ends[0]) if guess is None else guess
     if analysis.accuracy is None:
-        return (
-            Continuation.restore(problem, kept, **settings)
-            if go_on
-            else Continuation(problem, problem.initial(ends[0]), **settings)
-        )
+        return Continuation.restore(problem, kept, **settings) if y0 is None else Continuation(problem, y0, **settings)
     refining = (
         RefiningContinuation.restore(problem, kept, **settings)
-        if go_on
-        else RefiningContinuation(problem, problem.initial(ends[0]), **settings, accuracy=analysis.accuracy)
+        if y0 is None
+        else RefiningContinuation(problem, y0, **settings, accuracy=analysis.accuracy)
     )
     refining.tell = lambda text: context.console.detail(f"{name}: {text}")
     return refining
