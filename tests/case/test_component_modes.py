@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import scipy.linalg
 from command_line import call
 from models.chain_case import BUILDER, CHAIN
 
@@ -87,6 +90,25 @@ def test_what_contradicts_it_is_refused(write, reduction: str, said: str) -> Non
     with pytest.raises(CaseErrors) as caught:
         load_case(write(reduction))
     assert said in str(caught.value)
+
+
+def test_it_is_kept_with_contact_that_slides_too(tmp_path: Path) -> None:
+    """A stiff slider holds its dof as a reduction does: stuck modes are exact where those without it are not."""
+    n, asked, count = 60, 1e-5, 4
+    K = 100.0 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    M = np.diag(np.linspace(1.0, 3.0, n))
+    text = f"[model]\ndofs = {[f'm{k}' for k in range(n)]}\nM = {M.tolist()}\nK = {K.tolist()}\n".replace("'", '"')
+    slider = '[[contact]]\nname = "pad"\nlaw = "jenkins"\npairs = ["m40"]\ntangential_stiffness = 1e9\n'
+    linear = f'friction_limit = 1.0\n[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = {count}\n'
+    (tmp_path / "case.toml").write_text(f"{text}[reduction]\naccuracy = {asked}\ncompare = {count}\n{slider}{linear}")
+    assert call("run", str(tmp_path / "case.toml"), "--no-plots", "--out", str(tmp_path / "run")) == 0
+    held = K + 1e9 * np.diag(np.arange(n) == 40)
+    rows = list(csv.DictReader((tmp_path / "run" / "linear.csv").open()))
+    for contact, stiffness in (("stuck", held), ("free", K)):
+        exact = np.sqrt(scipy.linalg.eigh(stiffness, M, eigvals_only=True)[:count]) / (2 * np.pi)
+        found = [float(row["frequency_hz"]) for row in rows if row["contact"] == contact]
+        np.testing.assert_allclose(found, exact, rtol=asked)
+    assert "with sliding contact: " in (tmp_path / "run" / "run.log").read_text()
 
 
 def test_a_run_keeps_it_and_says_so(write, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Dict, List, Tuple, cast
 import numpy as np
 
 from ..model.compared import off_by
-from ..model.contact import in_limit
+from ..model.contact import Contact, in_limit
 from ..model.structure import SPIN
 from .checks_tables import waves_of
 from .schema import ReductionSection
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from .load import Case
 
 #: Lowest frequencies [Hz] of an unreduced model by the part of its stiffness that grows with the speed squared, the
-#: speed [rev/min] and the nodal diameter.
-FullHz = Dict[Tuple[str, float, int], List[float]]
+#: speed [rev/min], the nodal diameter and the limit of its contact.
+FullHz = Dict[Tuple[str, float, int, str], List[float]]
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,13 @@ class ReductionReport:
     wave_lines : list of str
         The same for the log.
     speeds : list of dict
-        The comparison at the lowest and the highest speed of analyses, contact stuck, for each nodal diameter.
+        The comparison at the lowest and the highest speed of analyses, contact stuck and sliding, for each nodal
+        diameter.
     chosen : str
         How its component modes were, for the log; empty where they were told.
+    sliding : dict
+        Of a structure: the same comparison with every pair closed and sliding without friction (of a law without a
+        normal direction: with no contact); empty where that is not another limit.
     """
 
     unreduced: int
@@ -72,10 +77,12 @@ class ReductionReport:
     wave_lines: list[str] = field(default_factory=list)
     speeds: list[dict[str, Any]] = field(default_factory=list)
     chosen: str = ""
+    sliding: dict[str, Any] = field(default_factory=dict)
 
     def every_relative(self) -> list[list[float | None]]:
-        """Of all frequencies that are compared, wave by wave and speed by speed."""
-        return [list(self.relative), *(found["relative"] for found in (*self.waves, *self.speeds))]
+        """Of all frequencies that are compared, limit by limit, wave by wave and speed by speed."""
+        further = [*([self.sliding] if self.sliding else []), *self.waves, *self.speeds]
+        return [list(self.relative), *(found["relative"] for found in further)]
 
     def plain(self) -> dict[str, Any]:
         """For run.json and results.h5."""
@@ -91,7 +98,8 @@ class ReductionReport:
                 f" {self.wall_s:.1f} s"
             )
             return [*self._chosen(), text, *(f"reduction: {line}" for line in self.wave_lines), *speeds]
-        return [*self._chosen(), self._line(), *speeds]
+        sliding = [f"reduction: with sliding contact: {_off(self.sliding)}"] if self.sliding else []
+        return [*self._chosen(), self._line(), *sliding, *speeds]
 
     def _chosen(self) -> list[str]:
         return [self.chosen] if self.chosen else []
@@ -140,15 +148,21 @@ def report_of(
 def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz) -> dict[str, Any]:
     assert case.reduction is not None
     count = min(case.reduction.compare, reduced.structure.n_dof)
-    small = _stuck_hz(reduced, count, comm) if count else []
-    full = _known_hz(full_hz, (SPIN, case.speed_rpm, 0), case, count, comm) if count else []
-    return {
-        "unreduced": case.structure.n_dof,
-        "kept": len(case.keep),
-        "full_hz": full,
-        "reduced_hz": small,
-        "relative": _relative(full, small),
-    }
+    limits = limits_of(case.contacts) if count else []
+    found = {}
+    for limit in limits:
+        small = _lowest_hz(reduced, count, comm, limit)
+        full = _known_hz(full_hz, (SPIN, case.speed_rpm, 0, limit), case, count, comm)
+        found[limit] = {"full_hz": full, "reduced_hz": small, "relative": _relative(full, small)}
+    stuck = found.pop("stuck", {"full_hz": [], "reduced_hz": [], "relative": []})
+    sliding = {limit: {"contact": limit, **values} for limit, values in found.items()}
+    return {"unreduced": case.structure.n_dof, "kept": len(case.keep), **stuck, **sliding}
+
+
+def limits_of(contacts: Sequence[Contact]) -> list[str]:
+    """Limits of the contact whose linear modes differ: between them lies what a mode does in slip."""
+    slides = any(contact.components > (contact.info.normal is not None) for contact in contacts)
+    return ["stuck", "sliding"] if slides else ["stuck"]
 
 
 def _relative(full: list[float], small: list[float]) -> list[float | None]:
@@ -156,12 +170,12 @@ def _relative(full: list[float], small: list[float]) -> list[float | None]:
     return [r / f - 1 if f else None for f, r in zip(full, small)]
 
 
-def _known_hz(known: FullHz, key: tuple[str, float, int], case: Case, count: int, comm: MPI.Comm) -> list[float]:
+def _known_hz(known: FullHz, key: tuple[str, float, int, str], case: Case, count: int, comm: MPI.Comm) -> list[float]:
     """Lowest frequencies of the unreduced model, solved for once. Collective."""
     if len(known.get(key, ())) < count:
-        part, speed, diameter = key
+        part, speed, diameter, limit = key
         at_speed = case if speed == case.turns_at(part) else case.turning(part, speed)
-        known[key] = _stuck_hz(at_speed, count, comm, diameter)
+        known[key] = _lowest_hz(at_speed, count, comm, limit, diameter)
     return known[key][:count]
 
 
@@ -179,27 +193,33 @@ def _at_speeds(
         if speed == case.turns_at(part):
             continue  # as it was reduced
         there = reduced.turning(part, speed)
-        for diameter in _compared(section, case.analyses) if sector else [0]:
-            full = _known_hz(full_hz, (part, speed, diameter), case, count, comm)
-            small = _stuck_hz(there, count, comm, diameter)
+        diameters = _compared(section, case.analyses) if sector else [0]
+        for diameter, limit in itertools.product(diameters, limits_of(case.contacts)):
+            full = _known_hz(full_hz, (part, speed, diameter, limit), case, count, comm)
+            small = _lowest_hz(there, count, comm, limit, diameter)
             values = {"full_hz": full, "reduced_hz": small, "relative": _relative(full, small)}
             wave = {"nodal_diameter": diameter} if sector else {}
-            found.append({"speed_rpm": speed, **wave, "contact": "stuck", **values})
+            found.append({"speed_rpm": speed, **wave, "contact": limit, **values})
     return found
+
+
+def _off(found: Mapping[str, Any]) -> str:
+    """How far a comparison's frequencies are off."""
+    return off_by(found["full_hz"], found["relative"])
 
 
 def _line_at_speed(found: Mapping[str, Any]) -> str:
     """For the log."""
     wave = f"{found['nodal_diameter']} nodal diameters, " if "nodal_diameter" in found else ""
-    return f"at {found['speed_rpm']:g} rev/min, {wave}stuck: {off_by(found['full_hz'], found['relative'])}"
+    return f"at {found['speed_rpm']:g} rev/min, {wave}{found['contact']}: {_off(found)}"
 
 
-def _stuck_hz(case: Case, count: int, comm: MPI.Comm, nodal_diameter: int = 0) -> list[float]:
-    """Lowest frequencies [Hz] without damping, every pair closed and stuck."""
+def _lowest_hz(case: Case, count: int, comm: MPI.Comm, limit: str, nodal_diameter: int = 0) -> list[float]:
+    """Lowest frequencies [Hz] without damping, every pair closed and stuck or sliding."""
     from ..model.modes import linear_modes
 
     plain = replace(case.structure, C=None, stiffness_damping=0.0, mass_damping=0.0)
-    with plain.model(in_limit(case.contacts, "stuck"), comm, nodal_diameter) as model:
+    with plain.model(in_limit(case.contacts, limit), comm, nodal_diameter) as model:
         return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]
 
 

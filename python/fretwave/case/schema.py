@@ -121,7 +121,10 @@ class ReductionSection(Section):
         default=None,
     )
     compare: Whole = key(
-        "linear modes compared with the unreduced model, 0 for none", example="5", default=COMPARED_MODES, ge=0
+        "linear modes compared with the unreduced model, contact stuck and sliding, 0 for none",
+        example="5",
+        default=COMPARED_MODES,
+        ge=0,
     )
     interface: Literal["whole", "modes"] = key(
         "faces of a sector: kept whole, or moving in modes that waves of the unreduced sector give",

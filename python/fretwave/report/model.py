@@ -167,7 +167,8 @@ def _reduction(found: Mapping[str, Any] | None) -> str:
         f"{counted(found['unreduced'], 'dof')} to {found['kept']} kept{faces} and {found['component_modes']}"
         f" component modes, up to {highest:.6g} Hz"
     )
-    waves = found.get("waves") or [{"full_hz": found["full_hz"], "reduced_hz": found["reduced_hz"]}]
+    stuck = {"contact": "stuck", "full_hz": found["full_hz"], "reduced_hz": found["reduced_hz"]}
+    waves = found.get("waves") or [stuck, *([found["sliding"]] if found.get("sliding") else [])]
     rows = [row for wave in (*waves, *found.get("speeds", ())) for row in _compared(wave)]
     head = ["", "linear frequency [Hz]", "reduced [Hz]", "relative difference"]
     return page.facts([("Craig-Bampton", said)]) + (page.table(head, rows) if rows else "")
@@ -175,7 +176,9 @@ def _reduction(found: Mapping[str, Any] | None) -> str:
 
 def _compared(wave: Mapping[str, Any]) -> Iterator[list[object]]:
     """Frequencies without and with reduction."""
-    where = f"nodal diameter {wave['nodal_diameter']}, {wave['contact']}" if "nodal_diameter" in wave else "stuck"
+    where = (
+        f"nodal diameter {wave['nodal_diameter']}, {wave['contact']}" if "nodal_diameter" in wave else wave["contact"]
+    )
     where = f"{wave['speed_rpm']:g} rev/min, {where}" if "speed_rpm" in wave else where
     for number, (full, small) in enumerate(zip(wave["full_hz"], wave["reduced_hz"]), 1):
         relative = f"{small / full - 1:.1e}" if full else "–"
