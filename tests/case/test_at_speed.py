@@ -251,7 +251,8 @@ def test_a_reduction_states_its_error_at_the_speeds_that_are_asked_for(sector, t
     for out in whole_and_reduced(tmp_path, sector, f"modes = {0 if sector else 1}\ncompare = 2\n", damper):
         rows = [row for row in rows_of(out) if row["speed_rpm"] == "45.0" and row.get("nodal_diameter", "0") == "0"]
         tables.append(np.array([float(row["frequency_hz"]) for row in rows]))
-    (found,) = json.loads((out / "run.json").read_text())["reduction"]["speeds"]
+    found, *others = json.loads((out / "run.json").read_text())["reduction"]["speeds"]
+    assert [other["nodal_diameter"] for other in others] == [3] * sector  # of all waves the last too
     assert found["speed_rpm"] == 45.0 and found.get("nodal_diameter") == (0 if sector else None)
     assert found["relative"] == pytest.approx(tables[1] / tables[0] - 1, rel=SOLVED) and max(found["relative"]) > 1e-3
     worst, log = max(found["relative"]), (out / "run.log").read_text()

@@ -41,7 +41,8 @@ def write(tmp_path: Path):
 def report(modes: int, error: float, unreduced: int = 10_000, interface: int = 0) -> ReductionReport:
     waves = [{"relative": [None, -error]}] if interface else []
     relative = [0.0 if interface else error]
-    return ReductionReport(unreduced, 100, modes, 1.0, [1.0], [1.0], relative, 0.0, 0.0, interface, waves)
+    comparison = [1.0], [1.0], relative
+    return ReductionReport(unreduced, 100, modes, 1.0, *comparison, 0.0, 0.0, interface, waves, faces=2 * interface)
 
 
 @pytest.mark.parametrize("interface", [0, 8])
@@ -109,6 +110,28 @@ def test_it_is_kept_with_contact_that_slides_too(tmp_path: Path) -> None:
         found = [float(row["frequency_hz"]) for row in rows if row["contact"] == contact]
         np.testing.assert_allclose(found, exact, rtol=asked)
     assert "with sliding contact: " in (tmp_path / "run" / "run.log").read_text()
+
+
+def test_of_a_sector_it_is_kept_in_the_waves_of_the_analyses(tmp_path: Path) -> None:
+    """Also where all inner dofs are needed: 20 of 23, one of each face and one of contact."""
+    n, sectors, diameters, count = 23, 6, 2, 3
+    K = 100.0 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    K[0, 0] = K[-1, -1] = 100.0
+    M, names = np.diag(np.linspace(1.0, 3.0, n)), [f"m{k}" for k in range(n)]
+    model = f'[model]\nsectors = {sectors}\nlow = ["m0"]\nhigh = ["m{n - 1}"]\ndofs = {names}\n'.replace("'", '"')
+    text = f"{model}M = {M.tolist()}\nK = {K.tolist()}\n[reduction]\naccuracy = 1e-12\ncompare = {count}\n"
+    slider = '[[contact]]\nname = "pad"\nlaw = "jenkins"\npairs = ["m9"]\ntangential_stiffness = 50.0\n'
+    linear = f'friction_limit = 1.0\n[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = {count}\n'
+    (tmp_path / "case.toml").write_text(f"{text}{slider}{linear}nodal_diameters = [{diameters}]\n")
+    assert call("run", str(tmp_path / "case.toml"), "--no-plots", "--out", str(tmp_path / "run")) == 0
+    log, found = ((tmp_path / "run" / name).read_text() for name in ("run.log", "run.json"))
+    assert "20 leave" in log and "not kept" not in log
+    waves = json.loads(found)["reduction"]["waves"]
+    assert [(wave["nodal_diameter"], wave["contact"]) for wave in waves] == [(2, "stuck"), (2, "sliding")]
+    tie = np.eye(n, n - 1, dtype=complex)
+    tie[-1, 0] = np.exp(2j * np.pi * diameters / sectors)
+    exact = scipy.linalg.eigh(tie.conj().T @ K @ tie, tie.conj().T @ M @ tie, eigvals_only=True)[:count]
+    np.testing.assert_allclose(waves[1]["reduced_hz"], np.sqrt(exact) / (2 * np.pi), rtol=1e-11)
 
 
 def test_a_run_keeps_it_and_says_so(write, tmp_path: Path) -> None:

@@ -120,6 +120,10 @@ class AnalysisSection(Section):
         """Its keys in the frequency domain: harmonics, wave, wheel, flow; None where it has none."""
         return None
 
+    def waves(self, sectors: int) -> list[int]:
+        """Nodal diameters of the waves that it looks at on a wheel of so many sectors, negative for backward ones."""
+        return []
+
     def spins(self) -> tuple[str, list[float]]:
         """Part of the stiffness that grows with the speed squared, and speeds [rev/min] that are not the case's."""
         return SPIN, []

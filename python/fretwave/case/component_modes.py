@@ -60,8 +60,7 @@ class Choice:
         errors = [abs(e) for waves in found.every_relative() for e in waves[: self.frequencies] if e is not None]
         error, before = max(errors, default=0.0), self.tried[-1][1] if self.tried else float("inf")
         self.tried.append((found.component_modes, error))
-        inner = (found.unreduced - found.kept) // (2 if found.interface else 1)  # a sector's faces are none of it
-        most = min(MOST, inner)
+        most = min(MOST, found.inner)
         if error <= self.asked:
             return None
         if error > GAIN * before:

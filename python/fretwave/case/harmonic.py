@@ -115,10 +115,10 @@ class HarmonicSection(AnalysisSection):
                 fix = "add [aerodynamics]"
                 report.wrong(("aerodynamics",), "needs forces of the flow", "a table [aerodynamics]", fix)
             if self.aerodynamics and facts.sectors is not None:
-                check_damped(report, "aerodynamics", self._moving(facts.sectors), facts)
+                check_damped(report, "aerodynamics", self.waves(facts.sectors), facts)
 
-    def _moving(self, sectors: int) -> list[int]:
-        """Nodal diameters of the waves that its motion is made of: of a mistuned wheel all."""
+    def waves(self, sectors: int) -> list[int]:
+        """Of a mistuned wheel all."""
         if self.mistuning is not None:
             return waves_of(sectors)
         return [] if self.nodal_diameter is None else [self.nodal_diameter]

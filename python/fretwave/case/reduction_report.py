@@ -13,8 +13,6 @@ import numpy as np
 from ..model.compared import off_by
 from ..model.contact import Contact, in_limit
 from ..model.structure import SPIN
-from .checks_tables import waves_of
-from .schema import ReductionSection
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
     from ..cyclic.reduction import SectorReduction
     from ..cyclic.waves import WaveError
     from ..model.reduction import Reduction
-    from .analysis import AnalysisSection
     from .load import Case
 
 #: Lowest frequencies [Hz] of an unreduced model by the part of its stiffness that grows with the speed squared, the
@@ -61,6 +58,8 @@ class ReductionReport:
     sliding : dict
         Of a structure: the same comparison with every pair closed and sliding without friction (of a law without a
         normal direction: with no contact); empty where that is not another limit.
+    faces : int
+        Dofs of a sector's faces, which no component mode moves.
     """
 
     unreduced: int
@@ -78,6 +77,12 @@ class ReductionReport:
     speeds: list[dict[str, Any]] = field(default_factory=list)
     chosen: str = ""
     sliding: dict[str, Any] = field(default_factory=dict)
+    faces: int = 0
+
+    @property
+    def inner(self) -> int:
+        """Dofs that component modes move: no more of these than that."""
+        return self.unreduced - self.kept - self.faces
 
     def every_relative(self) -> list[list[float | None]]:
         """Of all frequencies that are compared, limit by limit, wave by wave and speed by speed."""
@@ -193,7 +198,7 @@ def _at_speeds(
         if speed == case.turns_at(part):
             continue  # as it was reduced
         there = reduced.turning(part, speed)
-        diameters = _compared(section, case.analyses) if sector else [0]
+        diameters = _compared(case) if sector else [0]
         for diameter, limit in itertools.product(diameters, limits_of(case.contacts)):
             full = _known_hz(full_hz, (part, speed, diameter, limit), case, count, comm)
             small = _lowest_hz(there, count, comm, limit, diameter)
@@ -224,26 +229,33 @@ def _lowest_hz(case: Case, count: int, comm: MPI.Comm, limit: str, nodal_diamete
 
 
 def _of_sector(case: Case, reduction: SectorReduction) -> dict[str, Any]:
-    section = case.reduction
-    assert section is not None and case.structure.cut is not None
-    errors = reduction.error(_compared(section, case.analyses), section.compare) if section.compare else []
+    section, cut = case.reduction, case.structure.cut
+    assert section is not None and cut is not None and cut.low is not None and cut.high is not None
+    errors = reduction.error(_compared(case), section.compare) if section.compare else []
     first = _wave(errors[0]) if errors else {"full_hz": [], "reduced_hz": [], "relative": []}
     return {
-        "unreduced": case.structure.cut.n_dof,
+        "unreduced": cut.n_dof,
         "kept": int(reduction.low[0]),
         **{key: first[key] for key in ("full_hz", "reduced_hz", "relative")},
         "interface": reduction.n_interface,
+        "faces": len(cut.low) + len(cut.high),
         "waves": [_wave(error) for error in errors],
         "wave_lines": [error.line() for error in errors],
     }
 
 
-def _compared(section: ReductionSection, analyses: Mapping[str, AnalysisSection]) -> list[int]:
-    """Nodal diameters whose error is stated: unless told, those of the analyses and of the interface modes."""
+def _compared(case: Case) -> list[int]:
+    """Nodal diameters whose error is stated: unless told, those of the analyses and of the interface modes.
+
+    Of an analysis of many waves the least and the most.
+    """
+    section, cut = case.reduction, case.structure.cut
+    assert section is not None and cut is not None and cut.sectors is not None
     if section.compare_diameters is not None:
         return section.compare_diameters
-    found = [abs(d) for d in waves_of(analyses.values())] + list(section.interface_diameters or ())
-    return list(dict.fromkeys(found)) or [0]
+    waves = [[abs(d) for d in analysis.waves(cut.sectors)] for analysis in case.analyses.values()]
+    found = [end for several in waves if several for end in (min(several), max(several))]
+    return list(dict.fromkeys([*found, *(section.interface_diameters or ())])) or [0]
 
 
 def _wave(error: WaveError) -> dict[str, Any]:

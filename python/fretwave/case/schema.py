@@ -145,7 +145,9 @@ class ReductionSection(Section):
         lt=1,
     )
     compare_diameters: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
-        "nodal diameters compared (those of the analyses and of the interface modes)", example="[4, 8]", default=None
+        "nodal diameters compared (those of the analyses, of many the least and the most, and of the interface modes)",
+        example="[4, 8]",
+        default=None,
     )
     error_at: Optional[Positive] = key(
         "amplitude at which each mode's error against the unreduced model is estimated", "length", "1e-3", default=None
