@@ -49,7 +49,8 @@ KEEPS = 'dampers = [{ dof = "m23", c = 0.0 }]\n'
 @pytest.mark.parametrize("sector", [True, False])
 def test_each_unreduced_model_is_solved_once_whatever_numbers_are_tried(sector, solves, tmp_path):
     diameters = "compare_diameters = [0, 1]\n" if sector else ""
-    text = chain(sector, f"accuracy = {1e-6 if sector else 1e-9}\ncompare = 2\n{diameters}", f"{KEEPS}speeds_rpm = [0.0, 45.0]")
+    asked = f"accuracy = {1e-6 if sector else 1e-9}\ncompare = 2\n{diameters}"
+    text = chain(sector, asked, f"{KEEPS}speeds_rpm = [0.0, 45.0]")
     (tmp_path / "case.toml").write_text(text)
     assert call("run", tmp_path / "case.toml", "--no-plots", "--out", tmp_path / "run") == 0
     tries = (tmp_path / "run" / "run.log").read_text().count(" leave ")
