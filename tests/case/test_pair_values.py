@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import call
+from models.chain_case import BUILDER
+from models.wear_case import TEXT
 
 import fretwave as fw
 from fretwave.case.load import load_case
@@ -91,3 +94,26 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(fw.InputError, match="does not exist") as error:
         load_case(put(tmp_path, case=CASE.replace("limits", "limit")))
     assert "did you mean `limits.csv`?" in str(error.value)
+
+
+def with_stiffness(folder: Path, value: str, heading: str = "", system: str = "m-kg-s") -> Path:
+    """The built chain, whose pairs have areas, with its stiffness per area."""
+    shutil.copy(BUILDER, folder / "model.py")
+    (folder / "k.csv").write_text(f"pair,tangential_stiffness_per_area{heading}\n1,2e10\n0,2e10\n")
+    text = TEXT.replace("per_area = 2e10", f"per_area = {value}")
+    (folder / "case.toml").write_text(text.replace("[model]", f'[model]\nunits = "{system}"'))
+    return folder / "case.toml"
+
+
+@pytest.mark.parametrize(
+    ("system", "unit"), [("m-kg-s", "Pa/m"), ("mm-t-s", "MPa/mm"), ("in-lbf-s", "psi/in")], ids=["SI", "mm", "in"]
+)
+def test_what_is_given_per_area_has_the_unit_of_that(tmp_path: Path, system: str, unit: str) -> None:
+    """It was told, and expected of a table, as the force or stiffness of a pair."""
+    stiffness = load_case(with_stiffness(tmp_path, '"k.csv"', f" [{unit}]", system)).contacts[0].parameters
+    assert stiffness["tangential_stiffness"] == pytest.approx([4e6, 4e6])
+    per_pair = {"m-kg-s": "N/m", "mm-t-s": "N/mm", "in-lbf-s": "lbf/in"}[system]
+    for value, heading in (('"k.csv"', f" [{per_pair}]"), ("-1.0", "")):
+        with pytest.raises(fw.FretwaveError) as error:
+            load_case(with_stiffness(tmp_path, value, heading, system))
+        assert f"[{unit}]" in str(error.value)

@@ -33,6 +33,12 @@ def has_per_area(parameter: ParameterInfo) -> bool:
     return quantity(parameter.unit).startswith("force")
 
 
+def unit_of_key(key: str, parameter: ParameterInfo) -> str:
+    """Quantity of a parameter that a case gives by this key: as it is, or per area."""
+    given = quantity(parameter.unit)
+    return given if key == parameter.name else given.replace("force", "pressure", 1)
+
+
 def law_of(
     source: Source, number: int, section: ContactSection, laws: Mapping[str, LawInfo], found: list[FretwaveError]
 ) -> LawInfo | None:
@@ -187,7 +193,7 @@ def _value(
     sign = ">" if parameter.strict else ">="
     bounded = parameter.lower is not None and np.isfinite(parameter.lower)
     bound = f" {sign} {parameter.lower:g}" if bounded else ""
-    unit = source.units(parameter.unit)
+    unit = source.units(unit_of_key(str(path[-1]), parameter))
     expected = f"a number{bound}, or one per pair ({n_pairs}), or a {TABLE} file of them: {parameter.doc} [{unit}]"
     if value is None:
         if parameter.default is None:

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from ..registry import kinds
 from ..units import UnitSystem
-from .contact_parameters import PER_AREA, has_per_area
+from .contact_parameters import PER_AREA, has_per_area, unit_of_key
 from .json_schema import SECTIONS
 from .schema import ContactSection, GaugeSection
 from .toml.locate import Path as KeyPath
@@ -61,4 +61,4 @@ def _of_parameter(key: str, law: LawInfo | None) -> str:
         return "" if known[key].unit == "-" else known[key].unit
     if name not in known or not has_per_area(known[name]):
         return ""
-    return known[name].unit.replace("force", "pressure", 1)
+    return unit_of_key(key, known[name])
