@@ -135,6 +135,6 @@ def _fundamental(signal: CubicHermiteSpline, bounds: Array, beta: Array) -> Arra
     return np.asarray(np.abs(steady @ np.exp(-2j * np.pi * phase)) * 2.0 / PROJECTION_SAMPLES, dtype=float)
 
 
-def harmonic_amplitude(x: Array) -> float:
-    """Amplitude of the fundamental of one period, given without its last point (n samples)."""
-    return float(2.0 * np.abs(np.fft.rfft(x)[1]) / len(x))
+def fundamental(x: Array) -> complex:
+    """Amplitude and phase of the fundamental of one period, given without its last point (n samples)."""
+    return complex(2.0 * np.fft.rfft(x)[1] / len(x))

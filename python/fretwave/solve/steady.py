@@ -9,13 +9,14 @@ from typing import Any, Protocol, Union
 import numpy as np
 
 from ..arrays import Array
-from ..post.cycles import harmonic_amplitude
+from ..post.cycles import fundamental
 from ..post.motion import complex_amplitudes
 
 #: periods integrated between two looks at the amplitude of a forced motion
 PIECE = 10
 #: a forced motion is steady when the fundamental's relative change over a period, divided by the part that is
-#: lost in a period (so that slow convergence is not mistaken for an end), stays below this for `STEADY_PERIODS`
+#: lost in a period (so that slow convergence is not mistaken for an end), stays below this for `STEADY_PERIODS`; its
+#: amplitude and phase, for the amplitude of a beat that dies away stands still wherever it turns
 STEADY = 2e-5
 STEADY_PERIODS = 4
 MOST_PERIODS = 1500
@@ -125,25 +126,24 @@ def steady_motion(
     integrator : its force has the angular frequency `omega` [rad/s] and phase zero at t = 0
     """
     period = 2.0 * np.pi / omega
-    amplitudes: list[float] = []
-    while len(amplitudes) < MOST_PERIODS and not _is_steady(amplitudes):
+    found: list[complex] = []
+    while len(found) < MOST_PERIODS and not _is_steady(found):
         most = PIECE * STEPS_PER_PERIOD
         piece = integrator.run(*state, PIECE * period, period / samples, rtol=tolerance, most_steps=most)
         stopped = _stopped(piece, PIECE * period)
         if stopped:
-            amplitude = amplitudes[-1] if amplitudes else np.nan
-            return SteadyState(amplitude, len(amplitudes), False, state, stopped)
+            return SteadyState(abs(found[-1]) if found else np.nan, len(found), False, state, stopped)
         # the integrator may give one sample beyond the end
         state = piece["x"][PIECE * samples], piece["v"][PIECE * samples]
         motion = _along(np.asarray(piece["x"])[: PIECE * samples], seen).reshape(PIECE, samples)
-        amplitudes += [harmonic_amplitude(one) for one in motion]
-    return SteadyState(amplitudes[-1], len(amplitudes), _is_steady(amplitudes), state)
+        found += map(fundamental, motion)
+    return SteadyState(abs(found[-1]), len(found), _is_steady(found), state)
 
 
-def _is_steady(amplitudes: list[float]) -> bool:
+def _is_steady(found: list[complex]) -> bool:
     """Remaining distance estimated as change / (1 - ratio of successive changes), for the last few periods."""
-    if len(amplitudes) < 2 * STEADY_PERIODS:
+    if len(found) < 2 * STEADY_PERIODS:
         return False
-    change = np.abs(np.diff(amplitudes[-STEADY_PERIODS - 2 :])) + 1e-300
+    change = np.abs(np.diff(found[-STEADY_PERIODS - 2 :])) + 1e-300
     ratio = np.clip((change[-1] / change[0]) ** (1.0 / (len(change) - 1)), 0.0, 0.999)
-    return bool(change.max() / (1.0 - ratio) <= STEADY * amplitudes[-1])
+    return bool(change.max() / (1.0 - ratio) <= STEADY * abs(found[-1]))
