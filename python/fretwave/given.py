@@ -72,6 +72,19 @@ def positive(name: str, value: object) -> float:
     return float(numbers(name, value, above=0.0))
 
 
+def relative_tolerance(name: str, value: object) -> float:
+    """Above zero and below one, from which on nothing is resolved.
+
+    Raises
+    ------
+    InputError
+    """
+    found = positive(name, value)
+    if found >= 1:
+        raise InputError("a relative tolerance allows anything", name, repr(value), "> 0 and < 1", "give a smaller one")
+    return found
+
+
 def not_negative(name: str, value: object) -> float:
     """A finite number, zero or more.
 

@@ -309,3 +309,12 @@ def test_contacts_of_a_model_are_not_exchanged() -> None:
         model.contacts = []  # type: ignore[misc]
     with pytest.raises(AttributeError):
         model.contacts.append(model.contacts[0])  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("tolerance", [1.0, 10.0])
+def test_a_relative_tolerance_is_below_one(comm, tolerance):
+    """At 10 an undamped oscillator reached 150,000 times its start, and the run its end."""
+    with fw.Model([[1.0]], [[4.0]], comm=comm) as model, pytest.raises(fw.InputError, match="allows anything"):
+        fw.Transient(model).run([1.0], [0.0], 10.0, 0.1, rtol=tolerance)
+    with pytest.raises(fw.InputError, match="allows anything"):
+        fw.WearControl(tolerance=tolerance)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..given import positive, whole
+from ..given import positive, relative_tolerance, whole
 
 if TYPE_CHECKING:
     from .. import _core
@@ -81,7 +81,7 @@ class WearControl:
     Raises
     ------
     InputError
-        A value is not a positive number, or there is no such stepper.
+        A value is not a positive number, the tolerance not below one, or there is no such stepper.
     """
 
     stepper: str = "bogacki_shampine"
@@ -94,7 +94,7 @@ class WearControl:
     def __post_init__(self) -> None:
         from .steppers import STEPPERS
 
-        positive("wear.tolerance", self.tolerance)
+        relative_tolerance("wear.tolerance", self.tolerance)
         positive("wear.pressure_change", self.pressure_change)
         if self.first is not None:
             positive("wear.first", self.first)

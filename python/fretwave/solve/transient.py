@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import array_of, numbers, positive, positive_or_infinite, whole
+from ..given import array_of, numbers, positive_or_infinite, relative_tolerance, whole
 from ..kinds import of_their_kinds
 from ..model.model import Model
 from ..mpi.gather import on_all_ranks
@@ -109,12 +109,12 @@ class Transient:
         Raises
         ------
         InputError
-            An array does not fit the model, or a number is not above zero.
+            An array does not fit the model, a number is not above zero, or the tolerance not below one.
         """
         self.model.check_unchanged()
         for name, value in (("t_end", t_end), ("dt_out", dt_out)):
             numbers(name, value)
-        positive("rtol", rtol)
+        relative_tolerance("rtol", rtol)
         for name, value in (("limit", limit), ("most_steps", most_steps)):
             positive_or_infinite(name, value)
         t, x, v, steps, implicit, finished, reason = self._core.run(
