@@ -117,8 +117,9 @@ class Transient:
         relative_tolerance("rtol", rtol)
         for name, value in (("limit", limit), ("most_steps", most_steps)):
             positive_or_infinite(name, value)
-        t, x, v, steps, implicit, finished, reason = self._core.run(
-            self.model.vector(x0), self.model.vector(v0), t_end, dt_out, rtol, limit, float(most_steps)
-        )
+        with self.model.vectors(x0, v0) as (start, speed):
+            t, x, v, steps, implicit, finished, reason = self._core.run(
+                start, speed, t_end, dt_out, rtol, limit, float(most_steps)
+            )
         whole = {name: on_all_ranks(self.model.comm, local, axis=1) for name, local in (("x", x), ("v", v))}
         return {"t": t, **whole, "steps": steps, "implicit": implicit, "finished": finished, "reason": reason}
