@@ -19,7 +19,8 @@ PIECE = 10
 #: amplitude and phase, for the amplitude of a beat that dies away stands still wherever it turns
 STEADY = 2e-5
 STEADY_PERIODS = 4
-MOST_PERIODS = 1500
+#: a fundamental of damping ratio 0.001 needs some 1700 of these
+MOST_PERIODS = 3000
 #: more explicit steps than a quarter of these give way to implicit ones; more implicit ones end the integration
 STEPS_PER_PERIOD = 20_000
 
