@@ -76,8 +76,8 @@ def _sectors(wheel: NonlinearMode, sector: NonlinearMode) -> int:
 
 def _motion(sector: NonlinearMode, y: PETSc.Vec) -> Complex:
     """q_n (n_dof, harmonics) of unit amplitude, on every rank. Collective."""
-    rows = len(range(*sector.model.ownership))
-    local = y.getArray(readonly=True)[: rows * sector.harmonics.block_size].reshape(rows, -1)
+    shape = len(range(*sector.model.ownership)), sector.harmonics.block_size  # none on some ranks
+    local = y.getArray(readonly=True)[: shape[0] * shape[1]].reshape(shape)
     labels = sector.harmonics.labels
     whole = np.concatenate(sector.model.comm.allgather(local))
     return np.stack([one for _, one in sorted(complex_amplitudes(labels, whole).items())], axis=1)
