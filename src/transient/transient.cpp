@@ -99,6 +99,9 @@ PetscErrorCode Transient::after_step(TS ts) {
   return self->guard_.run([&] {
     self->record(ts);
     self->watch(ts);
+    Vec state;
+    check(TSGetSolution(ts, &state));
+    check(VecCopy(state, self->begun_));
   });
 }
 
@@ -149,8 +152,9 @@ void Transient::record(TS ts) {
   if (std::max(reached[0], reached[1]) > limit_) check(TSSetConvergedReason(ts, TS_CONVERGED_USER));
 }
 
-/// A trial step towards a state whose forces would be no numbers is taken shorter.
-PetscErrorCode Transient::expect_numbers(TS ts, PetscReal, Vec state, PetscBool* accept) {
+/// A trial step towards a state whose forces would be no numbers is taken shorter, and one that passes a kink
+/// between its ends.
+PetscErrorCode Transient::expect_sound(TS ts, PetscReal t, Vec state, PetscBool* accept) {
   Transient* self;
   PetscErrorCode code = TSGetApplicationContext(ts, &self);
   if (code) return code;
@@ -162,7 +166,7 @@ PetscErrorCode Transient::expect_numbers(TS ts, PetscReal, Vec state, PetscBool*
         if (!(std::abs(in[i]) <= largest_cubed)) numbers = 0;  // nor nan, which a maximum over ranks loses
     }
     MPI_Allreduce(MPI_IN_PLACE, &numbers, 1, MPI_INT, MPI_LAND, self->model_.comm());
-    *accept = numbers ? PETSC_TRUE : PETSC_FALSE;
+    *accept = numbers && !self->passes_kinks(ts, t, state) ? PETSC_TRUE : PETSC_FALSE;
   });
 }
 
@@ -285,7 +289,7 @@ void Transient::set_up(TS ts, Vec state, double tolerance, bool implicit) {
   implicit ? use_implicit(ts) : use_explicit(ts);
   check(TSSetApplicationContext(ts, this));
   check(TSSetPostStep(ts, after_step));
-  check(TSSetFunctionDomainError(ts, expect_numbers));
+  check(TSSetFunctionDomainError(ts, expect_sound));
   check(TSSetMaxTime(ts, end_));
   check(TSSetMaxSteps(ts, PETSC_MAX_INT));
   check(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_STEPOVER));
@@ -293,6 +297,7 @@ void Transient::set_up(TS ts, Vec state, double tolerance, bool implicit) {
   const Sizes size = sizes(state);
   const PetscInt n = model_.local_dofs();
   VecHandle allowed = like(state);
+  allowed_ = tolerance * size.x;
   {
     WriteArray out(allowed);
     std::fill_n(out.data(), n, tolerance * size.x);
@@ -335,6 +340,8 @@ History Transient::integrate(Vec x0, Vec v0, double tolerance, bool implicit) {
     std::copy_n(ReadArray(x0).data(), n, out.data());
     std::copy_n(ReadArray(v0).data(), n, out.data() + n);
   }
+  begun_ = like(state);
+  check(VecCopy(state, begun_));
   forces(0, state);  // the contacts' tangents say which entries the Jacobian has
   TsHandle ts;
   check(TSCreate(model_.comm(), ts.out()));

@@ -1,6 +1,7 @@
 #pragma once
 #include <petscts.h>
 
+#include <array>
 #include <complex>
 #include <string>
 
@@ -37,6 +38,10 @@ class Transient {
   /// From (x0, v0) to t_end, sampled every dt_out by the method's own interpolation; stops early when |x|
   /// exceeds `limit`, with that state, or when more than `most_steps` steps would be needed. Collective.
   History run(Vec x0, Vec v0, double t_end, double dt_out, double tolerance, double limit, double most_steps);
+  /// A contact's components of its pairs at a time, pairs innermost, and its tangents by displacements.
+  struct Seen {
+    std::vector<double> u, v, f, tangent;
+  };
 
  private:
   /// A contact's rows of B on this rank, its law's tangents at the present state, and room for that: a step
@@ -55,7 +60,7 @@ class Transient {
   static PetscErrorCode residual(TS, PetscReal, Vec, Vec, Vec, void*);
   static PetscErrorCode jacobian(TS, PetscReal, Vec, Vec, PetscReal, Mat, Mat, void*);
   static PetscErrorCode after_step(TS);
-  static PetscErrorCode expect_numbers(TS, PetscReal, Vec state, PetscBool* accept);
+  static PetscErrorCode expect_sound(TS, PetscReal, Vec state, PetscBool* accept);
   History integrate(Vec x0, Vec v0, double tolerance, bool implicit);
   Sizes sizes(Vec state);
   double rate(Vec shape);
@@ -71,6 +76,11 @@ class Transient {
   void assemble(double shift, Mat A);
   void assemble_contact(size_t number, Mat A);
   void add_tangent(size_t number, Vec x, Vec out);
+  Seen seen(size_t contact, Vec state);
+  Seen at_turn(contact::Law const&, Seen const& begin, Seen const& end, double h, size_t component,
+               size_t which) const;
+  bool passes_kink(size_t contact, Vec begin, Vec end, double h);
+  bool passes_kinks(TS, double t, Vec end);
   double largest(Vec state) const;
   void record(TS);
   void watch(TS);
@@ -86,10 +96,11 @@ class Transient {
   KspHandle mass_;
   std::vector<Tangents> tangents_;
   bool stiff_ = false, exhausted_ = false;
-  VecHandle x_, v_, force_, acceleration_, interpolated_;
+  VecHandle x_, v_, force_, acceleration_, interpolated_, begun_;  ///< the last: state at a step's begin
   Guard guard_;
   History history_;
   double interval_ = 0, end_ = 0, limit_ = 0, most_steps_ = 0;
+  double allowed_ = 0;  ///< error of displacements
 };
 
 }  // namespace fretwave::transient

@@ -29,9 +29,7 @@ class Transient:
     steps (Rosenbrock-W, order 3) with the laws' tangents, to the same tolerance.
     For contact laws that depend on the present motion only.
 
-    A stop that closes and opens again between two stages of a step is not seen, whatever the tolerance. Measured on a
-    single mass whose free motion peaks beyond a stiff stop: by up to 4e-5 of its amplitude at `rtol` 1e-10, 6e-4 at
-    1e-7, 1.6e-2 at 1e-4; its motion was then off by 1.5, 7 and 35 %.
+    A step in which a stop closes and opens again is taken shorter, where it goes deeper than `rtol` of the motion.
 
     Parameters
     ----------

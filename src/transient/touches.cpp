@@ -1,0 +1,117 @@
+/// Kinks of contact laws that a step passes between its ends and leaves again: a mass that touches a stop for
+/// less than a step. No stage of a method sees them, and no estimate of its error.
+#include <algorithm>
+#include <cmath>
+
+#include "transient/transient.h"
+
+namespace fretwave::transient {
+
+namespace {
+
+/// Shares of a step in which the cubic through (u0, u1) of slopes (m0, m1) turns:
+///   u'(s) = m0 + 2 s (3 (u1 - u0) - 2 m0 - m1) + 3 s^2 (m0 + m1 - 2 (u1 - u0)) = 0,   0 < s < 1.
+std::array<double, 2> turns(double u0, double u1, double m0, double m1) {
+  const double a = 3 * (m0 + m1 - 2 * (u1 - u0)), half = 3 * (u1 - u0) - 2 * m0 - m1;
+  const double square = half * half - a * m0;
+  if (!(square >= 0)) return {};
+  const double q = -(half + std::copysign(std::sqrt(square), half));
+  std::array<double, 2> found = {a == 0 ? 0 : q / a, q == 0 ? 0 : m0 / q};
+  for (double& s : found)
+    if (!(s > 0 && s < 1)) s = 0;
+  return found;
+}
+
+double cubic(double s, double u0, double u1, double m0, double m1) {
+  const double r = 1 - s;
+  return r * r * (u0 * (1 + 2 * s) + m0 * s) + s * s * (u1 * (1 + 2 * r) - m1 * r);
+}
+
+}  // namespace
+
+/// A contact in a state [x, v]: its displacements, velocities, forces and tangents. Collective.
+Transient::Seen Transient::seen(size_t number, Vec state) {
+  const PetscInt n = model_.local_dofs();
+  {
+    ReadArray in(state);
+    WriteArray x(x_), v(v_);
+    std::copy_n(in.data(), n, x.data());
+    std::copy_n(in.data() + n, n, v.data());
+  }
+  Tangents& at = tangents_[number];
+  contact_force(model_.contacts()[number], at, force_);
+  return {at.displacement, at.velocity, at.force, at.record.df_du};
+}
+
+/// The same, at rest, where a component of each pair turns within the step; where it does not, at its begin.
+Transient::Seen Transient::at_turn(contact::Law const& law, Seen const& one, Seen const& other, double h,
+                                   size_t component, size_t which) const {
+  const size_t d = law.components(), n = law.pairs();
+  Seen out{one.u, std::vector<double>(d * n, 0.0), std::vector<double>(d * n), {}};
+  for (size_t i = 0; i < n; ++i) {
+    const size_t turning = component * n + i;
+    const double s = turns(one.u[turning], other.u[turning], h * one.v[turning], h * other.v[turning])[which];
+    for (size_t k = i; k < d * n; k += n)
+      out.u[k] = cubic(s, one.u[k], other.u[k], h * one.v[k], h * other.v[k]);
+  }
+  contact::Record record;
+  law.force(
+      {.samples = 1, .components = int(d), .pairs = int(n), .u = out.u.data(), .v = out.v.data(), .step = 0},
+      out.f.data(), record);
+  out.tangent = std::move(record.df_du);
+  return out;
+}
+
+namespace {
+
+/// How far a pair's component went behind a kink since a state, if its force and tangent here are not those
+/// that the state tells: of a law of two straight pieces exactly so far.
+double behind(Transient::Seen const& here, Transient::Seen const& from, size_t d, size_t n, size_t component,
+              size_t pair) {
+  const auto tangent = [&](Transient::Seen const& at, size_t column) {
+    return at.tangent[(component * d + column) * n + pair];
+  };
+  const double now = tangent(here, component), then = tangent(from, component);
+  if (std::abs(now - then) <= 0.5 * std::max(std::abs(now), std::abs(then))) return 0;
+  const size_t row = component * n + pair;
+  double told = from.f[row];
+  for (size_t c = 0; c < d; ++c) told += tangent(from, c) * (here.u[c * n + pair] - from.u[c * n + pair]);
+  return std::abs((here.f[row] - told) / (now - then));
+}
+
+}  // namespace
+
+/// Whether a contact goes behind a kink, and comes back, between the ends of a step, by more than
+/// displacements may be off. Collective.
+bool Transient::passes_kink(size_t number, Vec begin, Vec end, double h) {
+  auto const& law = *model_.contacts()[number].law;
+  if (!law.uses_displacement()) return false;
+  const Seen one = seen(number, begin), other = seen(number, end);
+  const size_t d = law.components(), n = law.pairs();
+  if (one.tangent.size() != d * d * n || other.tangent.size() != d * d * n) return false;
+  for (size_t turn = 0; turn < 2 * d; ++turn) {
+    const size_t component = turn / 2;
+    const Seen here = at_turn(law, one, other, h, component, turn % 2);
+    if (here.tangent.size() != d * d * n) continue;
+    for (size_t i = 0; i < n; ++i)
+      if (std::min(behind(here, one, d, n, component, i), behind(here, other, d, n, component, i)) > allowed_)
+        return true;
+  }
+  return false;
+}
+
+/// Whether a trial step, of which this is the state at its end, passes such a kink: it is taken shorter,
+/// until an end of one lies behind the kink. Collective.
+bool Transient::passes_kinks(TS ts, double t, Vec end) {
+  double begin, h;
+  check(TSGetTime(ts, &begin));
+  check(TSGetTimeStep(ts, &h));
+  if (tangents_.empty() || t < begin + (1 - 1e-9) * h || h <= 1e-12 * interval_) return false;
+  int passed = 0;
+  for (size_t i = 0; i < tangents_.size(); ++i)
+    if (passes_kink(i, begun_, end, h)) passed = 1;
+  MPI_Allreduce(MPI_IN_PLACE, &passed, 1, MPI_INT, MPI_LOR, model_.comm());
+  return passed != 0;
+}
+
+}  // namespace fretwave::transient
