@@ -1,6 +1,7 @@
 /// Kinks of contact laws that a step passes between its ends and leaves again: a mass that touches a stop for
 /// less than a step. No stage of a method sees them, and no estimate of its error.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "transient/transient.h"
@@ -29,25 +30,27 @@ double cubic(double s, double u0, double u1, double m0, double m1) {
 
 }  // namespace
 
-/// A contact in a state [x, v]: its displacements, velocities, forces and tangents. Collective.
-Transient::Seen Transient::seen(size_t number, Vec state) {
-  const PetscInt n = model_.local_dofs();
-  {
-    ReadArray in(state);
-    WriteArray x(x_), v(v_);
-    std::copy_n(in.data(), n, x.data());
-    std::copy_n(in.data() + n, n, v.data());
+/// The contacts in a state [x, v]; nothing of those whose forces do not depend on displacements. Collective.
+std::vector<Transient::Seen> Transient::see(Vec state) {
+  place(state);
+  std::vector<Seen> out(tangents_.size());
+  for (size_t i = 0; i < out.size(); ++i) {
+    auto const& contact = model_.contacts()[i];
+    if (!contact.law->uses_displacement()) continue;
+    Tangents& at = tangents_[i];
+    meet(contact, at);
+    out[i] = {at.displacement, at.velocity, at.force, at.record.df_du};
   }
-  Tangents& at = tangents_[number];
-  contact_force(model_.contacts()[number], at, force_);
-  return {at.displacement, at.velocity, at.force, at.record.df_du};
+  return out;
 }
 
-/// The same, at rest, where a component of each pair turns within the step; where it does not, at its begin.
-Transient::Seen Transient::at_turn(contact::Law const& law, Seen const& one, Seen const& other, double h,
-                                   size_t component, size_t which) const {
+namespace {
+
+/// A contact at rest where a component of each pair turns within the step; where it does not, at its begin.
+Transient::Seen at_turn(contact::Law const& law, Transient::Seen const& one, Transient::Seen const& other,
+                        double h, size_t component, size_t which) {
   const size_t d = law.components(), n = law.pairs();
-  Seen out{one.u, std::vector<double>(d * n, 0.0), std::vector<double>(d * n), {}};
+  Transient::Seen out{one.u, std::vector<double>(d * n, 0.0), std::vector<double>(d * n), {}};
   for (size_t i = 0; i < n; ++i) {
     const size_t turning = component * n + i;
     const double s = turns(one.u[turning], other.u[turning], h * one.v[turning], h * other.v[turning])[which];
@@ -61,8 +64,6 @@ Transient::Seen Transient::at_turn(contact::Law const& law, Seen const& one, See
   out.tangent = std::move(record.df_du);
   return out;
 }
-
-namespace {
 
 /// How far a pair's component went behind a kink since a state, if its force and tangent here are not those
 /// that the state tells: of a law of two straight pieces exactly so far.
@@ -79,37 +80,36 @@ double behind(Transient::Seen const& here, Transient::Seen const& from, size_t d
   return std::abs((here.f[row] - told) / (now - then));
 }
 
-}  // namespace
-
-/// Whether a contact goes behind a kink, and comes back, between the ends of a step, by more than
-/// displacements may be off. Collective.
-bool Transient::passes_kink(size_t number, Vec begin, Vec end, double h) {
-  auto const& law = *model_.contacts()[number].law;
-  if (!law.uses_displacement()) return false;
-  const Seen one = seen(number, begin), other = seen(number, end);
+/// Whether a contact goes behind a kink, and comes back, between the ends of a step of length h, by more than
+/// displacements may be off.
+bool passes_kink(contact::Law const& law, Transient::Seen const& one, Transient::Seen const& other, double h,
+                 double allowed) {
   const size_t d = law.components(), n = law.pairs();
   if (one.tangent.size() != d * d * n || other.tangent.size() != d * d * n) return false;
   for (size_t turn = 0; turn < 2 * d; ++turn) {
     const size_t component = turn / 2;
-    const Seen here = at_turn(law, one, other, h, component, turn % 2);
+    const auto here = at_turn(law, one, other, h, component, turn % 2);
     if (here.tangent.size() != d * d * n) continue;
     for (size_t i = 0; i < n; ++i)
-      if (std::min(behind(here, one, d, n, component, i), behind(here, other, d, n, component, i)) > allowed_)
+      if (std::min(behind(here, one, d, n, component, i), behind(here, other, d, n, component, i)) > allowed)
         return true;
   }
   return false;
 }
 
-/// Whether a trial step, of which this is the state at its end, passes such a kink: it is taken shorter,
-/// until an end of one lies behind the kink. Collective.
+}  // namespace
+
+/// Whether a trial step, of which this is the state at its end, passes a kink: it is taken shorter, until an
+/// end of one lies behind the kink. Collective.
 bool Transient::passes_kinks(TS ts, double t, Vec end) {
   double begin, h;
   check(TSGetTime(ts, &begin));
   check(TSGetTimeStep(ts, &h));
   if (tangents_.empty() || t < begin + (1 - 1e-9) * h || h <= 1e-12 * interval_) return false;
+  const auto reached = see(end);
   int passed = 0;
-  for (size_t i = 0; i < tangents_.size(); ++i)
-    if (passes_kink(i, begun_, end, h)) passed = 1;
+  for (size_t i = 0; i < reached.size() && !passed; ++i)
+    passed = passes_kink(*model_.contacts()[i].law, begun_[i], reached[i], h, allowed_);
   MPI_Allreduce(MPI_IN_PLACE, &passed, 1, MPI_INT, MPI_LOR, model_.comm());
   return passed != 0;
 }

@@ -101,7 +101,7 @@ PetscErrorCode Transient::after_step(TS ts) {
     self->watch(ts);
     Vec state;
     check(TSGetSolution(ts, &state));
-    check(VecCopy(state, self->begun_));
+    self->begun_ = self->see(state);
   });
 }
 
@@ -340,8 +340,7 @@ History Transient::integrate(Vec x0, Vec v0, double tolerance, bool implicit) {
     std::copy_n(ReadArray(x0).data(), n, out.data());
     std::copy_n(ReadArray(v0).data(), n, out.data() + n);
   }
-  begun_ = like(state);
-  check(VecCopy(state, begun_));
+  begun_ = see(state);
   forces(0, state);  // the contacts' tangents say which entries the Jacobian has
   TsHandle ts;
   check(TSCreate(model_.comm(), ts.out()));

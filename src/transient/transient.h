@@ -1,7 +1,6 @@
 #pragma once
 #include <petscts.h>
 
-#include <array>
 #include <complex>
 #include <string>
 
@@ -70,16 +69,15 @@ class Transient {
   void use_implicit(TS);
   void resolve_sticking(double tolerance, double size, Vec allowed);
   void forces(double t, Vec state);
+  void place(Vec state);
+  void meet(model::Contact const&, Tangents&);
   void contact_force(model::Contact const&, Tangents&, Vec force);
   void solve_mass(Vec force, Vec acceleration);
   void prepare_jacobian();
   void assemble(double shift, Mat A);
   void assemble_contact(size_t number, Mat A);
   void add_tangent(size_t number, Vec x, Vec out);
-  Seen seen(size_t contact, Vec state);
-  Seen at_turn(contact::Law const&, Seen const& begin, Seen const& end, double h, size_t component,
-               size_t which) const;
-  bool passes_kink(size_t contact, Vec begin, Vec end, double h);
+  std::vector<Seen> see(Vec state);
   bool passes_kinks(TS, double t, Vec end);
   double largest(Vec state) const;
   void record(TS);
@@ -96,7 +94,8 @@ class Transient {
   KspHandle mass_;
   std::vector<Tangents> tangents_;
   bool stiff_ = false, exhausted_ = false;
-  VecHandle x_, v_, force_, acceleration_, interpolated_, begun_;  ///< the last: state at a step's begin
+  VecHandle x_, v_, force_, acceleration_, interpolated_;
+  std::vector<Seen> begun_;  ///< contacts at a step's begin
   Guard guard_;
   History history_;
   double interval_ = 0, end_ = 0, limit_ = 0, most_steps_ = 0;

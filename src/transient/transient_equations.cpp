@@ -16,7 +16,16 @@ void pairs_innermost(double const* rows, int d, int n, std::vector<double>& out)
 
 }  // namespace
 
-void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec force) {
+void Transient::place(Vec state) {
+  const PetscInt n = model_.local_dofs();
+  ReadArray in(state);
+  WriteArray x(x_), v(v_);
+  std::copy_n(in.data(), n, x.data());
+  std::copy_n(in.data() + n, n, v.data());
+}
+
+/// What a contact does at x_ and v_, with its law's tangents.
+void Transient::meet(model::Contact const& contact, Tangents& at) {
   check(MatMult(contact.B, x_, at.u));
   check(MatMult(contact.B, v_, at.v));
   const int d = contact.law->components(), n = contact.law->pairs();
@@ -29,6 +38,11 @@ void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec f
                       .v = at.velocity.data(),
                       .step = 0},
                      at.force.data(), at.record);
+}
+
+void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec force) {
+  meet(contact, at);
+  const int d = contact.law->components(), n = contact.law->pairs();
   {
     WriteArray rows(at.f);
     for (int c = 0; c < d; ++c)
@@ -39,13 +53,7 @@ void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec f
 
 /// force_ = C v + K x + B^T f - p, with x_, v_ and the contacts' tangents at the state.
 void Transient::forces(double t, Vec state) {
-  const PetscInt n = model_.local_dofs();
-  {
-    ReadArray in(state);
-    WriteArray x(x_), v(v_);
-    std::copy_n(in.data(), n, x.data());
-    std::copy_n(in.data() + n, n, v.data());
-  }
+  place(state);
   check(MatMult(K_, x_, force_));
   if (C_) check(MatMultAdd(C_, v_, force_, force_));
   for (size_t i = 0; i < tangents_.size(); ++i) contact_force(model_.contacts()[i], tangents_[i], force_);

@@ -153,21 +153,30 @@ def report_of(
 def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz) -> dict[str, Any]:
     assert case.reduction is not None
     count = min(case.reduction.compare, reduced.structure.n_dof)
-    limits = limits_of(case.contacts) if count else []
-    found = {}
-    for limit in limits:
-        small = _lowest_hz(reduced, count, comm, limit)
-        full = _known_hz(full_hz, (SPIN, case.speed_rpm, 0, limit), case, count, comm)
-        found[limit] = {"full_hz": full, "reduced_hz": small, "relative": _relative(full, small)}
-    stuck = found.pop("stuck", {"full_hz": [], "reduced_hz": [], "relative": []})
-    sliding = {limit: {"contact": limit, **values} for limit, values in found.items()}
-    return {"unreduced": case.structure.n_dof, "kept": len(case.keep), **stuck, **sliding}
+    limits = _limits(case.contacts) if count else []
+    found = [_comparison((SPIN, case.speed_rpm, 0, limit), case, reduced, count, comm, full_hz) for limit in limits]
+    sliding = {"sliding": found[1]} if len(found) > 1 else {}
+    return {"unreduced": case.structure.n_dof, "kept": len(case.keep), **_first(found), **sliding}
 
 
-def limits_of(contacts: Sequence[Contact]) -> list[str]:
+def _first(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Frequencies of the first comparison, none where nothing is compared."""
+    return {key: found[0][key] if found else [] for key in ("full_hz", "reduced_hz", "relative")}
+
+
+def _limits(contacts: Sequence[Contact]) -> list[str]:
     """Limits of the contact whose linear modes differ: between them lies what a mode does in slip."""
     slides = any(contact.components > (contact.info.normal is not None) for contact in contacts)
     return ["stuck", "sliding"] if slides else ["stuck"]
+
+
+def _comparison(
+    key: tuple[str, float, int, str], case: Case, reduced: Case, count: int, comm: MPI.Comm, full_hz: FullHz
+) -> dict[str, Any]:
+    """Lowest frequencies of the unreduced and of the reduced case, as it turns there. Collective."""
+    *_, diameter, limit = key
+    full, small = _known_hz(full_hz, key, case, count, comm), _lowest_hz(reduced, count, comm, limit, diameter)
+    return {"contact": limit, "full_hz": full, "reduced_hz": small, "relative": _relative(full, small)}
 
 
 def _relative(full: list[float], small: list[float]) -> list[float | None]:
@@ -199,12 +208,10 @@ def _at_speeds(
             continue  # as it was reduced
         there = reduced.turning(part, speed)
         diameters = _compared(case) if sector else [0]
-        for diameter, limit in itertools.product(diameters, limits_of(case.contacts)):
-            full = _known_hz(full_hz, (part, speed, diameter, limit), case, count, comm)
-            small = _lowest_hz(there, count, comm, limit, diameter)
-            values = {"full_hz": full, "reduced_hz": small, "relative": _relative(full, small)}
+        for diameter, limit in itertools.product(diameters, _limits(case.contacts)):
+            values = _comparison((part, speed, diameter, limit), case, there, count, comm, full_hz)
             wave = {"nodal_diameter": diameter} if sector else {}
-            found.append({"speed_rpm": speed, **wave, "contact": limit, **values})
+            found.append({"speed_rpm": speed, **wave, **values})
     return found
 
 
@@ -232,14 +239,14 @@ def _of_sector(case: Case, reduction: SectorReduction) -> dict[str, Any]:
     section, cut = case.reduction, case.structure.cut
     assert section is not None and cut is not None and cut.low is not None and cut.high is not None
     errors = reduction.error(_compared(case), section.compare) if section.compare else []
-    first = _wave(errors[0]) if errors else {"full_hz": [], "reduced_hz": [], "relative": []}
+    waves = [_wave(error) for error in errors]
     return {
         "unreduced": cut.n_dof,
         "kept": int(reduction.low[0]),
-        **{key: first[key] for key in ("full_hz", "reduced_hz", "relative")},
+        **_first(waves),
         "interface": reduction.n_interface,
         "faces": len(cut.low) + len(cut.high),
-        "waves": [_wave(error) for error in errors],
+        "waves": waves,
         "wave_lines": [error.line() for error in errors],
     }
 
