@@ -176,7 +176,6 @@ class Continuation:
     def __next__(self) -> Point:
         if self._over:
             raise StopIteration
-        PETSc.garbage_cleanup(self.problem.model.comm)  # what was dropped without its destroy(), by whomever
         with event("FwPoint"):
             point = self._core.next() if self._begun else self._first()
         last, self._begun = self._last, True
