@@ -52,8 +52,9 @@ if TYPE_CHECKING:
     from .results.reader import Run, open_run
     from .results.results import has_results, open_results
     from .solve.branch import Branch
-    from .solve.continuation import Continuation, Point
+    from .solve.continuation import Continuation
     from .solve.follow import follow
+    from .solve.point import Point
     from .solve.preload import balanced, static_preload
     from .solve.steps import StepControl, WearControl
     from .solve.sweep import Sweep, sweep
@@ -86,7 +87,8 @@ _HOMES = {
     "results.model_file": ("read_model", "write_model"),
     "solve.branch": ("Branch",),
     "solve.follow": ("follow",),
-    "solve.continuation": ("Continuation", "Point"),
+    "solve.continuation": ("Continuation",),
+    "solve.point": ("Point",),
     "solve.steps": ("StepControl", "WearControl"),
     "cyclic.sector": ("Sector",),
     "cyclic.reduction": ("SectorReduction", "reduce_sector"),

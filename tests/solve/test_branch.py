@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import doctest
-import gc
 import re
 from importlib import import_module
 from pathlib import Path
@@ -13,7 +12,6 @@ import numpy as np
 import pytest
 from models.core_models import dense, mode_problem, oscillator, whole
 from models.duffing import C, G, K, mode, response, steps, stiffness
-from petsc4py import PETSc
 from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
@@ -271,23 +269,6 @@ def test_picture_runs_through_the_closed_form_between_the_points(problem, ends):
     else:
         w = 2 * np.pi * x
         assert np.abs(((stiffness(y) - w**2) ** 2 + (C * w) ** 2) * y**2 / 0.1**2 - 1).max() < 0.05
-
-
-def test_nothing_is_left_to_petsc(capfd, comm):
-    """Its garbage list after model, mode and branch; freed first is what other tests left."""
-    gc.collect()
-    PETSc.garbage_cleanup(comm)
-    problem = mode()
-    branch = fw.follow(problem, 0.1, 4.0)
-    branch.coefficients(1.5)
-    branch.at(zeta=float(branch["zeta"][2]))
-    response()
-    gc.collect()
-    capfd.readouterr()
-    PETSc.garbage_view(comm)
-    comm.barrier()
-    text = capfd.readouterr().out
-    assert comm.rank or "Vec" not in text and "Total entries" in text, text
 
 
 def test_continuation_hands_out_its_points_once():

@@ -52,7 +52,8 @@ if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.nonlinear_mode import NonlinearMode
-    from ..solve.continuation import Continuation, Point
+    from ..solve.continuation import Continuation
+    from ..solve.point import Point
     from ..units import UnitSystem
     from .parts.branch import Describe
 

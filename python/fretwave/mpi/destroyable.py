@@ -2,11 +2,32 @@
 
 from __future__ import annotations
 
-from typing import NoReturn, TypeVar
+from contextlib import ExitStack
+from typing import NoReturn, Protocol, TypeVar
 
 from ..errors import InputError
 
 Own = TypeVar("Own", bound="Destroyable")
+
+
+class HasDestroy(Protocol):
+    """A vector, matrix or solver of PETSc, or what owns some."""
+
+    def destroy(self) -> object: ...
+
+
+Thing = TypeVar("Thing", bound=HasDestroy)
+
+
+class Owned(ExitStack):
+    """Things of PETSc that live until the end of a ``with`` block: ``y = own(x.duplicate())``. Collective.
+
+    What Python drops without `destroy` PETSc keeps, on several ranks and on one, until it is told to look for it.
+    """
+
+    def __call__(self, thing: Thing) -> Thing:
+        self.callback(thing.destroy)
+        return thing
 
 
 def destroyed(what: str) -> InputError:

@@ -26,6 +26,7 @@ from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
 from ..columns import SOURCES
 from ..console import Console
+from ..mpi.destroyable import Owned
 from ..mpi.petsc_options import AnalysisOptions
 from ..mpi.petsc_share import prefix_of
 from .study_outcomes import AnyOutcome, Outcome, ResponseOutcome
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
     from ..hb.harmonic_problem import HarmonicProblem
     from ..hb.harmonics import Harmonics
-    from ..solve.continuation import Point
+    from ..solve.point import Point
 
 Studied = Union[ModeAnalysis, ForcedAnalysis]
 
@@ -128,6 +129,7 @@ class Solver(ABC, Generic[Begun]):
         Estimates of errors are, where harmonics and samples follow from them.
         """
         from ..solve.continuation import Continuation
+        from ..solve.point import points_of
         from ..solve.refining import RefiningContinuation
 
         low, high = self._ends()
@@ -135,11 +137,11 @@ class Solver(ABC, Generic[Begun]):
         began = _clocks()
         settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(self.analysis.step)}
         settings["report_at"] = [float(a) for a in self.places]
-        if accuracy is None:
-            branch = Continuation(problem, problem.initial(low), **settings)
-        else:
-            branch = RefiningContinuation(problem, problem.initial(low), **settings, accuracy=accuracy)
-        for point in branch:
+        kind = Continuation if accuracy is None else RefiningContinuation
+        settings.update({} if accuracy is None else {"accuracy": accuracy})
+        with Owned() as own:
+            branch = kind(problem, own(problem.initial(low)), **settings)
+        for point in points_of(branch):
             spent += _clocks() - began
             newton += point.newton
             rows.append(_row(branch.problem, point))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,14 @@ from ..errors import InputError
 from ..given import listed, with_a_square
 from ..hb.harmonic_problem import HarmonicProblem
 from ..kinds import of_their_kinds
+from ..mpi.destroyable import Owned
 from ..mpi.log import event
 from ..mpi.same import expect_same
 from ..mpi.spread import Cuttable, Spread, fill
 from ..texts import shortened
+from .point import Point
 from .starting import far_from_start, given, starts
 from .steps import StepControl
-from .trace import Knot
 
 #: Relative change of sampled forces' harmonics on doubled samples above which a failure is put down to sampling.
 ALIASING_LIMIT = 1e-3
@@ -28,42 +29,6 @@ ALIASING_LIMIT = 1e-3
 
 #: Of a snapshot: the last anchor and the one before it.
 _VECTORS = ("y", "tangent", "before_y", "before_tangent")
-
-
-@dataclass
-class Point:
-    """A converged point of a branch. `y` and `tangent` are the caller's to keep or destroy.
-
-    Attributes
-    ----------
-    parameter : amplitude (modes) or omega (forced response)
-    event : "", start, stop, report, fold, zero_damping or peak_damping of a mode, peak of a response
-    step : arclength from the last regular point
-    wall_s : seconds since the point before; of a step with events inside, without theirs
-    rounding : error of the residual that rounding leaves, expected
-    accepted : 1 where the residual is below the tolerance, 0 where rounding let it fall no further
-    knot : its scalars and their derivatives over the step, where they are traced
-    errors : as `HarmonicProblem.errors` gives them, where the continuation has asked for them
-    """
-
-    index: int
-    y: PETSc.Vec
-    tangent: PETSc.Vec
-    parameter: float
-    step: float
-    event: str
-    newton: int
-    linear: int
-    residual: float
-    wall_s: float
-    rounding: float = 0.0
-    accepted: int = 1
-    knot: Knot | None = None
-    errors: dict[str, float] | None = None
-
-    def __repr__(self) -> str:
-        what = f" {self.event}" if self.event else ""
-        return f"Point({self.index}:{what} at {self.parameter:.6g}, residual {self.residual:.1e})"
 
 
 def _ends(stop: object) -> tuple[float, float]:
@@ -125,7 +90,7 @@ class Continuation:
         asked = [*stop, ways, *astuple(control), *reports]
         expect_same(problem.model.comm, "the ends, reports and steps of a branch", asked)
         with_a_square("an end of the branch", max(1.0, *(end for end in stop if end < np.inf)), "choose other units")
-        self.problem, self._y0, self._low, self._high = problem, y0, low, high
+        self.problem, self._y0, self._low, self._high = problem, y0.copy(), low, high
         self._core = _core.Continuation(problem.core, problem.prefix, low, high, control.core(), reports)
         if way:
             self._core.follow_as_way()
@@ -156,10 +121,13 @@ class Continuation:
         far = point is not None and not given(self._y0, point["y"]) and far_from_start(self.problem, point["y"])
         if point is not None and not far:
             return dict(point)
+        if point is not None:
+            Point(**point).destroy()
         reason = "the first point found is far from the linear mode" if far else str(self._core.reason)
         reasons: list[str] = []
         for how, y in starts(Continuation, self.problem, self._y0, reasons, far):
             point = self._core.start(y, self._upwards)
+            y.destroy()
             if point is not None:
                 self.started = how
                 return dict(point)
@@ -233,6 +201,10 @@ class Continuation:
         """Unknowns of the regular point that the branch last started a step from; None where it found no first one."""
         return self._core.anchor()["y"] or None
 
+    def _standing(self) -> dict[str, Any]:
+        """The numbers of `anchor` and of the step from there."""
+        return {name: value for name, value in self._core.anchor().items() if name not in _VECTORS}
+
     @property
     def missed(self) -> list[str]:
         """Reports and events that were asked for or seen and could not be had, each with its reason."""
@@ -265,21 +237,23 @@ class Continuation:
         before, solved again, to measure that by; `resumed_at` are unknowns and tangent there.
         """
         given = cls._told(problem, snapshot)
-        y0 = cls._scatter(problem, given["y"])
-        branch = cls(problem, y0, stop, steps, report_at, bool(given.get("upwards", True)))
+        with Owned() as own:
+            y0 = own(cls._scatter(problem, given["y"]))
+            branch = cls(problem, y0, stop, steps, report_at, bool(given.get("upwards", True)))
         branch._go_on(given)
         return branch
 
     def _go_on(self, snapshot: dict[str, Any]) -> None:
         """Stand where the snapshot was taken. Collective."""
-        found = [name for name in _VECTORS if name in snapshot]
-        vectors = {name: self._scatter(self.problem, snapshot[name]) for name in found}
-        before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
         began = float(snapshot.get("began", np.nan))
         wary, smooth = bool(snapshot.get("wary", False)), bool(snapshot.get("smooth", False))
         step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
-        now = [vectors["y"], vectors["tangent"]]
-        point = self._core.restore(now, before, step, index, wary, smooth, emitted, self._upwards, began)
+        with Owned() as own:
+            found = [name for name in _VECTORS if name in snapshot]
+            vectors = {name: own(self._scatter(self.problem, snapshot[name])) for name in found}
+            before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
+            now = [vectors["y"], vectors["tangent"]]
+            point = self._core.restore(now, before, step, index, wary, smooth, emitted, self._upwards, began)
         self.repeated = None if point is None else Point(**point)
         anchor = self._core.anchor()
         self.resumed_at = (point["y"], point["tangent"]) if point is not None else (anchor["y"], anchor["tangent"])
@@ -310,5 +284,7 @@ class Continuation:
 
     def destroy(self) -> None:
         """Free the solver. Collective."""
+        for vector in (self._y0, *(self.resumed_at or ())):
+            vector.destroy()
         self._last, self._over = None, True
         self._core = None  # type: ignore[assignment]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from ..hb.observer import Observer
 from ..kinds import of_their_kinds
 from ..mpi.same import expect_same
 from .branch import Branch
-from .continuation import Continuation, Point, reports_of
+from .continuation import Continuation, reports_of
+from .point import Point, points_of
 from .refining import RefiningContinuation
 from .steps import StepControl
 from .table import Table
@@ -161,22 +162,6 @@ def row_of(problem: HarmonicProblem, point: Point, number: int, errors: bool = T
         "samples": problem.harmonics.samples,
         "event": point.event,
     }
-
-
-def points_of(branch: Continuation) -> Iterator[Point]:
-    """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
-    before = None
-    for point in branch:
-        yield point
-        _free(before)
-        before = point
-    _free(before)
-
-
-def _free(point: Point | None) -> None:
-    if point is not None:
-        point.y.destroy()
-        point.tangent.destroy()
 
 
 def _accuracy(given: object) -> float:

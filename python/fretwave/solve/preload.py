@@ -19,8 +19,10 @@ from ..model.laws import own_load
 from ..model.model import Model
 from ..model.modes import LinearMode, linear_modes
 from ..model.rest import Rest
+from ..mpi.destroyable import Owned
 from ..mpi.gather import on_all_ranks
-from .continuation import Continuation, Point
+from .continuation import Continuation
+from .point import Point
 from .steps import StepControl
 
 #: What is kept of each contact.
@@ -78,9 +80,11 @@ class StaticPreload(HarmonicProblem):
         self.stiffness = stiffness = reference.omega**2 / float(np.sum(reference.shape**2)) / times
         size = (float(np.linalg.norm(load)) or stiffness) / stiffness
         self.force_scale, self.size = stiffness * size, size
-        core = _core.StaticPreload(model.core, model.vector(load), size, stiffness)
+        with model.vectors(load) as (own,):
+            core = _core.StaticPreload(model.core, own, size, stiffness)
         if constant is not None:
-            core.preload(model.vector(np.zeros(model.n_dof)), model.vector(constant))
+            with model.vectors(np.zeros(model.n_dof), constant) as preload:
+                core.preload(*preload)
         super().__init__(model, Harmonics([0], 2), prefix, core)
 
     def at(self, displacement: Array, factor: float) -> PETSc.Vec:
@@ -104,9 +108,10 @@ def balanced(model: Model, reference: LinearMode | None = None) -> Rest:
         Scales the unknowns; by default the lowest one with stuck contact.
     """
     problem = StaticPreload(model, np.zeros(model.n_dof), reference or linear_modes(model, 1)[0])
-    y = problem.core.initial()
-    problem.core.settle(y)  # sliders of a state solved before must not act on this one
-    return _settled(problem, y, np.zeros(model.n_dof))
+    with Owned() as own:
+        y = own(problem.core.initial())
+        problem.core.settle(y)  # sliders of a state solved before must not act on this one
+        return _settled(problem, y, np.zeros(model.n_dof))
 
 
 @of_their_kinds
@@ -154,45 +159,48 @@ def static_preload(
     history = None if sliders is None else model.local_sliders(sliders)
     control = steps or StepControl(initial=0.1, maximum=0.5)
 
-    def begin(times: float) -> tuple[StaticPreload, Continuation]:
+    def begin(times: float) -> tuple[StaticPreload, Continuation, Point | None]:
         problem = StaticPreload(model, load, reference, rest.load, times=times)
-        start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
+        start = own(problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR))
         if history is not None:
-            start = _moved_by(problem, history, start, control)
-        return problem, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
+            start = own(_moved_by(problem, history, start, control))
+        branch = own(Continuation(problem, start, (-1.0, 1.0), control, upwards=True))
+        return problem, branch, next(branch, None)
 
-    problem, branch = begin(1.0)
-    first = next(branch, None)
-    if (times := _times(first, branch)) > FAR:
-        branch.destroy()
-        problem, branch = begin(times)
-        first = next(branch, None)
-    y, reached, reason = None, 0.0, ""
-    for point in chain([] if first is None else [first], branch):
-        y, reached = point.y, point.parameter
-        if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
-            led = _led_by(_of_dofs(model, point.tangent), names)
-            reason = f"the structure moves without load{led}: nothing holds it in some direction"
-            break
-    if branch.converged:
-        free = _free_motion(problem, y)
-        if free is None:
-            return _settled(problem, y, rest.load + load, history)
-        led = _led_by(free, names)
-        if not led:
-            problem.core.settle(y, history or [])
-            led = _led_by(_slowest(model, reference), names)
-        reason = f"it is not the only equilibrium: nothing holds the structure in a direction without load{led}"
-    elif y is None and (led := _led_by(_slowest(model, reference), names)):
-        reason = f"{branch.reason}: the structure moves without load{led}"
-    raise NotConverged(
-        "no static equilibrium under the full load",
-        None,
-        f"load factor {reached:.4g}: {reason or branch.reason}"
-        + suspects(model.contacts, problem.stiffness, model.units),
-        "1",
-        "hold the structure where contact alone cannot (an axial stop), or lower the load",
-    )
+    with Owned() as own:
+        problem, branch, first = begin(1.0)
+        if first is not None and (times := _times(first, branch)) > FAR:
+            own(first)
+            problem, branch, first = begin(times)
+        last, reason = None, ""
+        for point in chain([] if first is None else [first], branch):
+            if last is not None:
+                last.destroy()
+            last = point
+            if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
+                led = _led_by(_of_dofs(model, point.tangent), names)
+                reason = f"the structure moves without load{led}: nothing holds it in some direction"
+                break
+        y = None if last is None else own(last).y
+        if branch.converged and y is not None:
+            free = _free_motion(problem, y)
+            if free is None:
+                return _settled(problem, y, rest.load + load, history)
+            led = _led_by(free, names)
+            if not led:
+                problem.core.settle(y, history or [])
+                led = _led_by(_slowest(model, reference), names)
+            reason = f"it is not the only equilibrium: nothing holds the structure in a direction without load{led}"
+        elif y is None and (led := _led_by(_slowest(model, reference), names)):
+            reason = f"{branch.reason}: the structure moves without load{led}"
+        raise NotConverged(
+            "no static equilibrium under the full load",
+            None,
+            f"load factor {0.0 if last is None else last.parameter:.4g}: {reason or branch.reason}"
+            + suspects(model.contacts, problem.stiffness, model.units),
+            "1",
+            "hold the structure where contact alone cannot (an axial stop), or lower the load",
+        )
 
 
 def _moved_by(problem: StaticPreload, history: list[list[float]], start: PETSc.Vec, control: StepControl) -> PETSc.Vec:
@@ -200,30 +208,29 @@ def _moved_by(problem: StaticPreload, history: list[list[float]], start: PETSc.V
 
     Newton finds that from where no slider has moved, or as they go there in steps.
     """
-    for shares in WAYS_OF_SLIDERS:
-        y: PETSc.Vec | None = start
-        for share in shares:
-            problem.core.stand([[share * w for w in sliders] for sliders in history])
-            way = Continuation(problem, y, (-1.0, 1.0), control, upwards=True, way=True)
-            point = next(way, None)
-            y = None if point is None else point.y.copy()
-            way.destroy()
-            if y is None:
-                break
-        if y is not None:
-            return y
+    with Owned() as own:
+        for shares in WAYS_OF_SLIDERS:
+            y, point = start, None
+            for share in shares:
+                problem.core.stand([[share * w for w in sliders] for sliders in history])
+                way = Continuation(problem, y, (-1.0, 1.0), control, upwards=True, way=True)
+                point = next(way, None)
+                way.destroy()
+                if point is None:
+                    break
+                y = own(point).y
+            if point is not None:
+                return y.copy()
     problem.core.stand(history)
-    return start
+    return start.copy()
 
 
-def _times(first: Point | None, branch: Continuation) -> float:
+def _times(first: Point, branch: Continuation) -> float:
     """Displacement under the full load as it begins, over what displacements are measured by; 1 where nothing holds it.
 
     The reference mode may be one that the load does not move, and its length is none where a reduction's coordinates,
     lengths and square roots of mass, stand in one vector. Collective.
     """
-    if first is None:
-        return 1.0
     by_load = abs(branch.last_entry(first.tangent))
     return float(np.sqrt(max(1.0 - by_load**2, 0.0)) / by_load) if by_load >= UNHELD else 1.0
 
@@ -249,20 +256,20 @@ def _free_motion(problem: StaticPreload, y: PETSc.Vec) -> Array | None:
     by ranks.
     """
     newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)
-    load_factor, b = y.duplicate(), y.duplicate()
-    load_factor.set(0.0)
-    first, end = y.getOwnershipRange()
-    b.setArray(1.0 - 2.0 * (np.arange(first, end) * 2654435761 % 2**32 // 2**31))
-    if end == y.getSize():
-        load_factor.setValue(end - 1, 1.0)
-        b.setValue(end - 1, 0.0)
-    for vector in (load_factor, b):
-        vector.assemble()
-    newton.system.close(load_factor, 0.0)
-    x = y.duplicate()
-    if newton.linear(y, b, x) and b.norm() > SOFTEST * x.norm():
-        return None
-    return _of_dofs(problem.model, x)
+    with Owned() as own:
+        load_factor, b, x = (own(y.duplicate()) for _ in range(3))
+        load_factor.set(0.0)
+        first, end = y.getOwnershipRange()
+        b.setArray(1.0 - 2.0 * (np.arange(first, end) * 2654435761 % 2**32 // 2**31))
+        if end == y.getSize():
+            load_factor.setValue(end - 1, 1.0)
+            b.setValue(end - 1, 0.0)
+        for vector in (load_factor, b):
+            vector.assemble()
+        newton.system.close(load_factor, 0.0)
+        if newton.linear(y, b, x) and b.norm() > SOFTEST * x.norm():
+            return None
+        return _of_dofs(problem.model, x)
 
 
 def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array, history: list[list[float]] | None = None) -> Rest:
@@ -270,14 +277,15 @@ def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array, history: list[li
 
     That rest, small beside the load, would be large beside the forces of a small motion.
     """
-    rest = _of_dofs(problem.model, problem.residual(y)) * problem.force_scale
+    with Owned() as own:
+        rest = _of_dofs(problem.model, own(problem.residual(y))) * problem.force_scale
+        blocks = _of_dofs(problem.model, own(problem.core.coefficients(y)))
     size = float(np.linalg.norm(load)) or float(np.linalg.norm(load + rest)) or 1.0
     load = load + rest
     contact = problem.diagnostics(y)
     periods = problem.contact_history(y)
     on_first = problem.model.comm.rank == 0
     contacts = [{key: np.asarray(c[key])[0] for key in TOLD} for c in periods] if on_first else None
-    blocks = _of_dofs(problem.model, problem.core.coefficients(y))
     problem.core.settle(y, history or [])
     imbalance = float(np.linalg.norm(rest)) / size
     sliders = problem.model.sliders()

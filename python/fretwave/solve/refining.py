@@ -13,8 +13,10 @@ from .. import _core
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.harmonics import Harmonics
 from ..hb.states import Estimate
+from ..mpi.destroyable import Owned
 from .accuracy import MOST_SAMPLES, ROUNDS, TOLERATED, Aim, limiting, most_harmonics
-from .continuation import Continuation, Point
+from .continuation import Continuation
+from .point import Point
 from .steps import StepControl
 
 #: Points so near to each other (relative, in the parameter) tell how two sets differ.
@@ -77,8 +79,8 @@ class RefiningContinuation(Continuation):
     def __next__(self) -> Point:
         if self._present is not None and not self._core.ends:
             wanted = self._aim.next(self.problem.harmonics, self.least)
-            if wanted is not None:
-                self._move(wanted, self._present, "next_step")
+            if wanted is not None and (moved := self._move(wanted, self._present, "next_step")) is not None:
+                moved.destroy()
         point = super().__next__()
         shares = self._judged(point)
         for _ in range(ROUNDS):
@@ -106,6 +108,7 @@ class RefiningContinuation(Continuation):
         kept = self.problem, self._core, self._missed_before, self._helped_before
         found = self._move(harmonics, self._present or point, "step")
         if found is not None and self._present is not None:
+            found.destroy()
             try:
                 found = super().__next__()
             except StopIteration:
@@ -113,8 +116,7 @@ class RefiningContinuation(Continuation):
                 self.problem, self._core, self._missed_before, self._helped_before = kept
         if found is None:
             return None
-        point.y.destroy()
-        point.tangent.destroy()
+        point.destroy()
         return replace(found, **{name: getattr(point, name) + getattr(found, name) for name in SUMS})
 
     def _judged(self, point: Point) -> dict[str, float]:
@@ -131,7 +133,7 @@ class RefiningContinuation(Continuation):
         ----------
         step : what the continuation calls the length to go on with: "step" that has led from the point, or "next_step"
         """
-        problem, state = self.problem.on(harmonics), self._core.anchor()
+        problem, state = self.problem.on(harmonics), self._standing()
         core = _core.Continuation(problem.core, problem.prefix, self._low, self._high, *self._settings)
         of = self._of if point is self._present else self.problem
         y, tangent = (of.embedded(problem, v) for v in (point.y, point.tangent))
@@ -205,9 +207,10 @@ class RefiningContinuation(Continuation):
         """Goes on on the snapshot's set, `problem` having the least. Collective."""
         given = cls._told(problem, snapshot)
         now = problem.on(problem.harmonics.up_to(int(given["harmonics"]), int(given["samples"])))
-        y0, accuracy = cls._scatter(now, given["y"]), float(given["accuracy"])
-        ways = bool(given["upwards"])
-        branch = cls(now, y0, stop, steps, report_at, ways, accuracy=accuracy, least=problem.harmonics)
+        kept: dict[str, Any] = {"accuracy": float(given["accuracy"]), "least": problem.harmonics}
+        with Owned() as own:
+            y0 = own(cls._scatter(now, given["y"]))
+            branch = cls(now, y0, stop, steps, report_at, bool(given["upwards"]), **kept)
         branch._go_on(given)
         branch._aim, branch.points = Aim.of(given["aim"]), int(given["points"])
         branch.missed_by = {source: int(n) for source, n in zip(LIMITS, given["missed_by"]) if n}

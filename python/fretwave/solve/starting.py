@@ -13,6 +13,7 @@ from ..hb.forced_response import ForcedResponse
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.nonlinear_mode import NonlinearMode
 from ..model.law_info import Role
+from ..mpi.destroyable import Owned
 from .steps import StepControl
 
 if TYPE_CHECKING:
@@ -118,9 +119,9 @@ def _closed(
 def mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> _core.ModeStart:
     """The way with closing gaps at the amplitude of y0. Collective."""
     method, amplitude = getattr(_core.Method, problem.method), problem.parameter(y0)
-    re, im = (problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary))
-    model, harmonics = problem.model.core, problem.harmonics.core
-    way = _core.ModeStart(model, harmonics, method, problem.row, problem.start.omega, re, im, amplitude)
+    model, harmonics, start = problem.model.core, problem.harmonics.core, problem.start
+    with problem.model.vectors(start.shape, start.imaginary) as (re, im):
+        way = _core.ModeStart(model, harmonics, method, problem.row, start.omega, re, im, amplitude)
     way.keep_loads(problem.core)
     return way
 
@@ -132,16 +133,17 @@ def _led(
     way = Way(problem, core)
     control = StepControl(initial=0.05, maximum=0.3, max_points=WAY_POINTS)
     closing = how == CLOSING
-    stop = (0.0, 2 * way.last_entry(core.initial())) if closing else (-1.0, 1.0)
-    branch = follow(way, core.initial(), stop, control, upwards=not closing, way=True)
-    last, count, reason = _last(branch, stop[0 if closing else 1])
-    if branch.converged and last is not None:
-        y = core.response(last) if isinstance(core, _core.ForcedStart) else core.mode(last)
-        branch.destroy()
-        yield f"by {how} in {count} steps", y
-        return
-    reasons.append(f"{how}: {reason}")
-    branch.destroy()
+    with Owned() as own:
+        begin = own(core.initial())
+        stop = (0.0, 2 * way.last_entry(begin)) if closing else (-1.0, 1.0)
+        branch = own(follow(way, begin, stop, control, upwards=not closing, way=True))
+        last, count, reason = _last(branch, stop[0 if closing else 1])
+        end = own(last) if last is not None else None
+        if not branch.converged or end is None:
+            reasons.append(f"{how}: {reason}")
+            return
+        y = core.response(end) if isinstance(core, _core.ForcedStart) else core.mode(end)
+    yield f"by {how} in {count} steps", y
 
 
 def _grown(
@@ -170,17 +172,20 @@ def _from_afar(
         begin = amplitude * ratio**power
         span = (0.5 * begin, amplitude) if upwards else (amplitude, 2 * begin)
         for control in GROWTH:
-            branch = follow(problem, problem.initial(begin), span, control, upwards=upwards, way=True)
-            last, count, reason = _last(branch, amplitude, nearby=True)
-            converged = branch.converged
-            branch.destroy()
+            with Owned() as own:
+                branch = own(follow(problem, own(problem.initial(begin)), span, control, upwards=upwards, way=True))
+                last, count, reason = _last(branch, amplitude, nearby=True)
+                converged = branch.converged
             if converged and last is not None:
                 yield f"the mode was followed from amplitude {begin:.3g} in {count} steps", last
                 return
+            end = ""
+            if last is not None:
+                end = f" to {problem.parameter(last):.3g}"
+                last.destroy()
             if not count:
                 break
         if count:
-            end = "" if last is None else f" to {problem.parameter(last):.3g}"
             reasons.append(f"following the mode from amplitude {begin:.3g}{end}: {reason}")
             return
     if not far:
@@ -203,6 +208,7 @@ def _last(branch: Continuation, goal: float, nearby: bool = False) -> tuple[PETS
         point.tangent.destroy()
         last, count = point.y, count + 1
         if nearby and count == 1 and far_from_start(branch.problem, last):
+            last.destroy()
             return None, 0, branch.reason
         if (left := abs(point.parameter - goal)) < nearest:
             nearest, since = left, count

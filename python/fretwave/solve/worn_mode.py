@@ -16,8 +16,9 @@ from ..hb.nonlinear_mode import NonlinearMode
 from ..kinds import of_their_kinds
 from ..model.law_info import Role
 from ..model.laws import law_like
-from ..mpi.destroyable import Destroyable
+from ..mpi.destroyable import Destroyable, Owned
 from .continuation import Continuation
+from .point import points_of
 from .steppers import StageFailed
 from .steps import StepControl
 
@@ -238,14 +239,14 @@ class WornMode(Destroyable):
         length = abs(change)
         ends = (target * float(np.exp(-2 * length)), target * float(np.exp(2 * length)))
         steps = StepControl(initial=length / 8, minimum=1e-4 * length, maximum=length, max_points=DETOUR_POINTS)
-        branch = Continuation(self.problem, y, ends, steps, [target], upwards=change < 0)
         found = None
-        for point in branch:
-            point.tangent.destroy()
-            if point.event == "report":
-                found = point.y
-                break
-        branch.destroy()
+        with Owned() as own:
+            branch = own(Continuation(self.problem, y, ends, steps, [target], upwards=change < 0))
+            for point in points_of(branch):
+                if point.event == "report":
+                    own(point.tangent)
+                    found = point.y
+                    break
         return found
 
     def log_amplitude(self, y: PETSc.Vec) -> float:

@@ -14,6 +14,7 @@ from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...errors import InputError
 from ...hb.suspects import FREE, RETURNS, TOO_SMALL, lossless, suspects, vanishing
+from ...mpi.destroyable import Owned
 from ...mpi.log import event
 from ...mpi.spread import Spread
 from ...post.contact_history import MEASURED
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
     from ...hb.observed import Observed
     from ...model.modes import LinearMode
     from ...model.rest import Rest
-    from ...solve.continuation import Continuation, Point
+    from ...solve.continuation import Continuation
+    from ...solve.point import Point
     from ...solve.steps import StepControl
     from ...units import UnitSystem
     from ..flutter import FlutterAnalysis
@@ -176,25 +178,23 @@ def continuation(
     Parameters
     ----------
     name : of the branch, in the log, where an analysis has several
-    guess : of its first point, if it is not the problem's own
+    guess : of its first point, if it is not the problem's own; freed
     """
     from ...solve.continuation import Continuation
     from ...solve.refining import RefiningContinuation
 
     analysis, name = context.analysis, name or context.name
     settings: dict[str, Any] = {"stop": ends, "steps": step_control(analysis.step), "report_at": list(report_at)}
-    kept, y0 = None if snapshot is None else dict(snapshot), None
-    if not go_on:
-        y0 = problem.initial(ends[0]) if guess is None else guess
-    if analysis.accuracy is None:
-        return Continuation.restore(problem, kept, **settings) if y0 is None else Continuation(problem, y0, **settings)
-    refining = (
-        RefiningContinuation.restore(problem, kept, **settings)
-        if y0 is None
-        else RefiningContinuation(problem, y0, **settings, accuracy=analysis.accuracy)
-    )
-    refining.tell = lambda text: context.console.detail(f"{name}: {text}")
-    return refining
+    kind = Continuation if analysis.accuracy is None else RefiningContinuation
+    if go_on:
+        branch = kind.restore(problem, None if snapshot is None else dict(snapshot), **settings)
+    else:
+        settings.update({} if analysis.accuracy is None else {"accuracy": analysis.accuracy})
+        with Owned() as own:
+            branch = kind(problem, own(problem.initial(ends[0]) if guess is None else guess), **settings)
+    if isinstance(branch, RefiningContinuation):
+        branch.tell = lambda text: context.console.detail(f"{name}: {text}")
+    return branch
 
 
 def mode_problem(
@@ -275,16 +275,18 @@ def points_of(branch: Continuation) -> Iterator[Point]:
 
     Their vectors are freed a point later, for the branch may look back at its last one.
     """
-    from ...solve.follow import points_of
+    from ...solve.point import points_of
     from ...solve.trace import Trace
 
     trace = Trace(branch.problem)
-    if branch.resumed_at is not None:
-        trace.add(*branch.resumed_at)
-    for point in points_of(branch):
-        point.knot = trace.add(point.y, point.tangent, branch.problem)
-        yield point
-    trace.close(branch.problem)
+    try:
+        if branch.resumed_at is not None:
+            trace.add(*branch.resumed_at)
+        for point in points_of(branch):
+            point.knot = trace.add(point.y, point.tangent, branch.problem)
+            yield point
+    finally:
+        trace.close(branch.problem)
 
 
 def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

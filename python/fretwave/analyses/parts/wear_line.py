@@ -144,7 +144,9 @@ class _Marcher:
                 row = self._record(march, point, time.perf_counter() - clock)
                 self._say(row)
                 clock = time.perf_counter()
-            return self._close(march)
+            closed = self._close(march)
+            march.state.y.destroy()
+            return closed
 
     def _open(self, mode: WornMode) -> tuple[Wear, Iterator[WearPoint]]:
         """The march from its start, or from where a killed run left it."""

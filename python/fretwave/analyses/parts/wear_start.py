@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import NotConverged
+from ...mpi.destroyable import Owned
 from ...mpi.gather import on_all_ranks
 from .branch import mode_problem, points_of, step_control
 from .context import AnalysisContext
@@ -15,7 +16,7 @@ from .rest import retained, start_mode
 from .wear_line import wear_areas
 
 if TYPE_CHECKING:
-    from ...solve.continuation import Point
+    from ...solve.point import Point
     from ..mode import ModeAnalysis
     from ..wear import WearAnalysis
 
@@ -31,25 +32,24 @@ def unworn_starts(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis
     context.leave_out(harmonics.left_out)
     problem = mode_problem(context, harmonics, stuck, rest)
     low, high = min(settings.amplitude[0], *analysis.amplitude), max(settings.amplitude[1], *analysis.amplitude)
-    branch = Continuation(
-        problem, problem.initial(low), (low, high), step_control(settings.step), sorted(analysis.amplitude)
-    )
     found: dict[str, Any] = {}
-    areas = wear_areas(context.case)
-    with WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
-        for point in points_of(branch):
-            if "cycle_unit" not in found:
-                load = mode.measure(point.y, np.zeros(len(mode.areas))).load
-                where = f"analysis '{analysis.name}'"
-                found["cycle_unit"] = mode.cycle_unit(load, analysis.cycles, analysis.cycle_unit, where)
-            _take(context, analysis, point, found)
-            if len(found) == 1 + 2 * len(analysis.amplitude):
-                break
-    why = branch.reason
+    control, reports, areas = step_control(settings.step), sorted(analysis.amplitude), wear_areas(context.case)
+    with Owned() as own:
+        branch = own(Continuation(own(problem), own(problem.initial(low)), (low, high), control, reports))
+        mode = own(WornMode(problem, analysis.coefficient, areas))
+        with context.console.progress(context.name):
+            for point in points_of(branch):
+                if "cycle_unit" not in found:
+                    load = mode.measure(point.y, np.zeros(len(mode.areas))).load
+                    where = f"analysis '{analysis.name}'"
+                    found["cycle_unit"] = mode.cycle_unit(load, analysis.cycles, analysis.cycle_unit, where)
+                _take(context, analysis, point, found)
+                if len(found) == 1 + 2 * len(analysis.amplitude):
+                    own(point)
+                    break
+        why = branch.reason
     if len(found) < 1 + 2 * len(analysis.amplitude):
         context.console.line(f"{context.name}: the mode ends early: {why}")
-    branch.destroy()
-    problem.destroy()
     if len(found) < 2:
         raise NotConverged(
             "the mode reaches none of the amplitudes of wear",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Optional
 
 from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
+from ...mpi.destroyable import Owned
 from .branch import mode_problem, step_control
 from .rest import rest_state, retained
 from .tuned import tuned_sector
@@ -54,10 +55,10 @@ def _unfolded(
 
     analysis = context.analysis
     low, high = analysis.amplitude
-    branch = Continuation(one, one.initial(low), (low, high), step_control(analysis.step))
-    point = next(branch, None)
-    y = None if point is None else around_wheel(problem, one, point.y, nodal_diameter(analysis))
-    if branch.started:
-        context.console.line(f"{context.name}: started: on one sector {branch.started}")
-    branch.destroy()
-    return y
+    with Owned() as own:
+        branch = own(Continuation(one, own(one.initial(low)), (low, high), step_control(analysis.step)))
+        point = next(branch, None)
+        y = None if point is None else around_wheel(problem, one, own(point).y, nodal_diameter(analysis))
+        if branch.started:
+            context.console.line(f"{context.name}: started: on one sector {branch.started}")
+        return y
