@@ -46,7 +46,7 @@ def test_values_of_a_run_that_is_done_and_of_one_that_was_killed(tmp_path, done)
 
 
 def test_what_is_not_there_is_said(tmp_path):
-    with pytest.raises(fw.InputError, match="no results"):
+    with pytest.raises(fw.InputError, match="no results here(?s:.*)give the folder of a run"):
         fw.open_run(tmp_path)
     write(tmp_path, True)
     with pytest.raises(KeyError, match="mode"):

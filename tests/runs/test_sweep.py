@@ -280,6 +280,8 @@ def test_killed_sweep_goes_on_with_the_values_not_done(case: Path, swept: Path, 
         process.wait()
     first = (tmp_path / "values" / "0000" / "results.h5").read_bytes()
     assert not (tmp_path / "results.h5").exists()
+    shown = launch(1, "-m", "fretwave", "show", str(tmp_path))
+    assert shown.returncode == 2 and "no results here yet" in shown.stderr and "`fretwave resume" in shown.stderr
     done = launch(2, "-m", "fretwave", "resume", str(tmp_path), "--no-plots", timeout=120)
     assert done.returncode == 0, done.stderr
     assert "friction_limit = 0.2 N: already done" in done.stdout

@@ -19,6 +19,7 @@ from ..kinds import of_their_kinds
 from ..texts import display
 from ..units import units_of
 from .journal import unfinished
+from .record import RECORD
 from .rows import Rows, build_group
 
 if TYPE_CHECKING:
@@ -176,6 +177,14 @@ def has_results(folder: str | Path) -> bool:
     return (folder / "results.h5").exists() or bool(unfinished(folder))
 
 
+def no_results(folder: Path) -> InputError:
+    """Of a folder of no run, or of one that was ended before anything was solved, or a sweep in its midst."""
+    if not (folder / RECORD).exists():
+        return InputError("there are no results here", display(folder), fix="give the folder of a run")
+    fix = f"`fretwave resume {display(folder)}` goes on with the run"
+    return InputError("there are no results here yet", display(folder), fix=fix)
+
+
 def unit_of_amplitudes(group: h5py.Group) -> str:
     """Of an analysis; that of its lengths where the results tell none."""
     of_lengths = units_of(group.attrs)("length")
@@ -251,7 +260,7 @@ def _open_file(path: Path) -> h5py.File:
     import h5py
 
     if not path.exists():
-        raise InputError("there are no results here", display(path), fix="give the folder of a run")
+        raise no_results(path.parent)
     if not path.is_file():
         raise InputError("results.h5 is no file", display(path), fix="give the folder of a run")
     check_whole(path, "results.h5")

@@ -13,7 +13,7 @@ from ..columns import name_of
 from ..errors import InputError
 from ..kinds import of_their_kinds
 from .analysis import Analysis, Table, read_analysis
-from .file import has_results, open_results
+from .file import has_results, no_results, open_results
 from .stamp import of_one_model
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def open_run(folder: str | Path) -> Run:
         There are no results, or they are damaged.
     """
     if not has_results(Path(folder)):
-        raise InputError("there are no results here", str(folder), fix="give the folder of a run")
+        raise no_results(Path(folder))
     return Run(folder)
 
 
