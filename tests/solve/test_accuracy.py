@@ -168,6 +168,18 @@ def test_a_set_above_the_most_harmonics_is_made_no_smaller():
 
 
 @SERIAL
+def test_every_resonance_of_a_long_branch_gives_back_what_it_took():
+    """Behind the twentieth one the largest set stayed to the end, at up to fifty times the cost of a point."""
+    aim, little = rules.Aim(), {"all": 1e-3, "harmonics": 1e-3, "samples": 0.0}
+    least, large = (fw.choose_harmonics(jenkins(), highest, 512) for highest in (5, 205))
+    for _ in range(60):
+        for _ in range(rules.AGAIN):
+            aim.see(little)
+        found = aim.next(large, least)
+        assert found is not None and found.orders[-1] < 0.5 * large.orders[-1]
+
+
+@SERIAL
 def test_a_branch_goes_on_from_a_snapshot_with_the_set_it_had():
     def points(branch, most=None):
         return [(p.parameter, branch.problem.harmonics.orders[-1], p.event) for _, p in zip(range(most or 999), branch)]

@@ -18,8 +18,9 @@ AIM, LOW = 0.6, 0.5
 #: that is believed. Contact forces with kinks have 3 to 4 and 1 to 2, friction that jumps 1 in the harmonics.
 ORDER_OF = {"harmonics": 3.0, "samples": 1.5}
 ORDERS = (1.0, 8.0)
-#: A set is changed at most so many times for one point, and made smaller so many times on a branch.
-ROUNDS, SMALLER = 3, 20
+#: A set is changed at most so many times for one point, and made smaller so many times on a branch, and once more in
+#: so many of its points: what a narrow resonance asks for is given back behind it.
+ROUNDS, SMALLER, AGAIN = 3, 20, 20
 #: A set grows at most so many times at once.
 FACTOR = 3
 #: No more harmonics and samples than these; harmonics above MANY as long as there are no more unknowns than these.
@@ -93,7 +94,7 @@ class Aim:
         growth = min(max(now / self.before, 1.0), 2.0) if self.before > 0 else 1.0
         if now * growth > 1:
             return self._larger(at, self.harmonics * growth, self.samples * growth)
-        if self.steps <= PATIENCE or self.smaller >= SMALLER:
+        if self.steps <= PATIENCE or self.smaller >= SMALLER + self.steps // AGAIN:
             return None
         found = self._smaller(at, least)
         self.smaller += found is not None
