@@ -7,6 +7,7 @@ entry point therefore runs inside :func:`guarded`, and scripts get the same thro
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 import traceback
@@ -16,7 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
-from ..errors import EXIT_OTHER, FretwaveError, exit_code_of
+from ..errors import EXIT_OTHER, FretwaveError, PetscError, exit_code_of
 from ..files.whole import file_error
 from ..texts import display
 from .alone import RANKS
@@ -83,12 +84,12 @@ def _wait(requests: list[Any], seconds: float) -> bool:
 
 def describe(error: BaseException, rank: int | None = None, traced: bool = False) -> str:
     """The message for an exception; an unexpected one brings its traceback if `traced`, else the place it came from."""
-    if isinstance(error, FretwaveError):
-        text = error.render()
-        return text if rank is None else f"{text}\n  {'rank:':<10}{rank}"
     plain = in_words(error)
     if plain is not None:
         return describe(plain, rank)
+    if isinstance(error, FretwaveError):
+        text = error.render()
+        return text if rank is None else f"{text}\n  {'rank:':<10}{rank}"
     if isinstance(error, KeyboardInterrupt):
         kept = ": finished points are kept; `fretwave resume RUNDIR` goes on from there"
         return f"interrupted{'' if traced else kept}"  # nobody knows what a script keeps
@@ -111,13 +112,20 @@ def _plugins() -> set[str]:
     return {str(module.__file__) for name, module in list(sys.modules.items()) if name.startswith(PLUGIN)}
 
 
+#: What libraries say where there is no memory: PETSc, the system, C++, Python (of a thread's stack), MUMPS.
+SHORT = re.compile(
+    r"out of memory|cannot allocate memory|bad_alloc|can't start new thread|INFOG\(1\) ?= ?-(5|7|13)\b", re.IGNORECASE
+)
+
+
 def in_words(error: BaseException) -> FretwaveError | None:
     """The message of an error that the machine makes, not fretwave: disk, memory, libraries; else None."""
+    if isinstance(error, FretwaveError) and not isinstance(error, PetscError):
+        return None
     if isinstance(error, OSError):
         return file_error(error)
     text = " ".join(str(error).split())
-    short = any(words in text.lower() for words in ("out of memory", "cannot allocate memory", "bad_alloc"))
-    if isinstance(error, MemoryError) or short:
+    if isinstance(error, MemoryError) or SHORT.search(text):
         return FretwaveError(
             "there is not enough memory",
             measured=text or None,
