@@ -74,6 +74,7 @@ def worn():
     fw.wear(branch, 5e-2, 1e-6, {"contact": [1.0]}, 1e3)
 
 
+@pytest.mark.ranks(1, 2, 4)
 @pytest.mark.parametrize("work", [followed, as_accurate_as_asked, gone_on_with, at_rest, unheld, worn])
 def test_nothing_is_left_to_petsc(capfd, comm, work):
     """Its garbage list after a script's work; freed first is what other tests left."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..columns import name_of
-from ..errors import InputError
 from ..kinds import of_their_kinds
 from .analysis import Analysis, Table, read_analysis
 from .file import has_results, no_results, open_results
