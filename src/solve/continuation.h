@@ -188,6 +188,12 @@ class Continuation {
   void emit_end(Trial const& end, double target, double length, std::string const& event);
   void polish(Trial&, double target);
   std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);
+  std::optional<Trial> reach_by_steps(double target, Place a, Place b, Hermite const&);
+  std::optional<Trial> at_value(double target, Place a, Place b, Hermite const&, double length,
+                                std::string& why);
+  static constexpr double off_the_curve = 0.5;  ///< of a step: a solution farther from it is another branch
+  static constexpr double value_error = 1e-9;   ///< relative, of a parameter's value reached along the branch
+  static constexpr char elsewhere[] = "Newton goes to another branch there";
   static constexpr char reported_stop[] = "report stop";  ///< while a step is looked at
   std::string stop_event(double end) const;
   void locate_values(Trial const& end, Hermite const&, double length);

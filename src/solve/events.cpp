@@ -9,13 +9,8 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr int looks = 40;             // for where a guess passes a parameter
-constexpr int nodes = 8;              // parts of a step in which its cubic is looked at
-constexpr double near_zero = 0.3;     // of the smaller end value: so low a minimum may hide two zeros
-constexpr double value_error = 1e-9;  // relative, of a reported value reached along the branch
-constexpr double polished = 1e-6;     // arclength: a step farther than that is no polish
-char const* const elsewhere = "Newton goes to another branch there";
-constexpr double off_the_curve = 0.5;  // of the step: a solution farther from the cubic is another branch
+constexpr int nodes = 8;           // parts of a step in which its cubic is looked at
+constexpr double near_zero = 0.3;  // of the smaller end value: so low a minimum may hide two zeros
 
 }  // namespace
 
@@ -183,17 +178,6 @@ void Continuation::emit_end(Trial const& end, double target, double length, std:
   emit(std::move(trial), length, event);
 }
 
-/// Where guesses along the step pass a value of the parameter's entry, by bisection: just before it.
-double Continuation::passing(std::function<VecHandle(double)> const& guess, double target, Place from,
-                             double to) {
-  double inside = from.at;
-  for (int k = 0; k < looks; ++k) {
-    const double middle = (inside + to) / 2;
-    ((last_entry(guess(middle)) < target) == (from.value < target) ? inside : to) = middle;
-  }
-  return inside;
-}
-
 /// A trial where the branch leaves its range, if the guess at `length` lies beyond: what is there is not
 /// asked for, and may be harder. None where there is no solution, as beside a fold, or no way to speak of.
 std::optional<Continuation::Trial> Continuation::attempt_end(Vec guess, double shortest, double& length) {
@@ -211,74 +195,6 @@ std::optional<Continuation::Trial> Continuation::attempt_end(Vec guess, double s
   if (!(reached > shortest && reached <= length)) return {};
   length = reached;
   return trial;
-}
-
-/// The branch at a given parameter between two places of the step.
-void Continuation::reach(double value, std::string const& event, Place a, Place b, Hermite const& curve,
-                         double length) {
-  const double target = problem_.parameter_entry(value);
-  // on the cubic, which is as monotone as the branch but for rounding
-  const auto on_curve = [&](double at) { return curve.value(at); };
-  Trial trial = at(curve.value(passing(on_curve, target, a, b.at)));
-  set_last_entry(trial.y, target);  // to the last digit, not to that of a linear solve
-  const VecHandle expected = copy(trial.y);
-  bool good = correct(trial, parameter_row_, target, row_);
-  const auto place = [&] { return dot(row_, trial.y) - row_value_; };
-  const double slack = 0.05 * (b.at - a.at);
-  if (good)
-    good = place() > a.at - slack && place() < b.at + slack &&
-           distance(trial.y, expected) <= off_the_curve * length;
-  if (!good) {
-    auto along = reach_along(target, a, b, curve);
-    if (!along) {
-      if (event == "report")
-        miss("report at " + problem_.parameter_text(value),
-             trial.outcome.converged ? elsewhere : trial.outcome.reason);
-      return;
-    }
-    trial = std::move(*along);
-  }
-  polish(trial, target);
-  emit(std::move(trial), std::clamp(place(), a.at, b.at), event);
-}
-
-/// One Newton step more: what is reported is as good as the corrector can make it, not just good enough. The
-/// tangent does not feel so short a way.
-void Continuation::polish(Trial& trial, double target) {
-  if (way_) return;
-  VecHandle better = copy(trial.y);
-  check(SNESSetForceIteration(newton_.snes(), PETSC_TRUE));
-  newton_.system().close(parameter_row_, target);
-  Outcome outcome = newton_.solve(better);
-  check(SNESSetForceIteration(newton_.snes(), PETSC_FALSE));
-  // counted as the one step it is: at rounding level its line search ends where it likes
-  const int newton = trial.outcome.newton + 1, linear = trial.outcome.linear + outcome.linear;
-  const bool near = distance(better, trial.y) <= polished;  // not so where `reach_along` has refused it
-  if (near && outcome.converged && outcome.residual <= trial.outcome.residual)
-    trial.y = std::move(better), trial.outcome = std::move(outcome);
-  trial.outcome.newton = newton, trial.outcome.linear = linear;
-}
-
-/// The same along the branch, where the corrector at a fixed parameter fails (beside a fold).
-std::optional<Continuation::Trial> Continuation::reach_along(double target, Place a, Place b,
-                                                             Hermite const& curve) {
-  a.value -= target, b.value -= target;
-  const double most = off_the_curve * (b.at - a.at);
-  for (int k = 0; k < 60; ++k) {
-    double at = secant(a, b);
-    if (k % 3 == 2) at = (a.at + b.at) / 2;
-    Trial trial = this->at(curve.value(at));
-    if (!correct(trial, row_, row_value_ + at, row_)) return {};
-    const double value = last_entry(trial.y) - target;
-    if (std::abs(value) <= value_error * std::max(1.0, std::abs(target))) {
-      Trial exact = this->at(copy(trial.y));
-      set_last_entry(exact.y, target);
-      const bool good = correct(exact, parameter_row_, target, row_) && distance(exact.y, trial.y) <= most;
-      return good ? std::move(exact) : std::move(trial);
-    }
-    ((value < 0) == (a.value < 0) ? a : b) = {at, value};
-  }
-  return {};
 }
 
 }  // namespace fretwave::solve
