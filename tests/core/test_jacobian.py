@@ -23,6 +23,8 @@ STEP = 1e-3
 class MixedLaw(LinearLaw):
     """f = k u + u^2 v: even and odd in turn, uses both arguments."""
 
+    odd = False
+
     def force(self, u, v):
         return self.k * u + u**2 * v + 0.3 * u**2
 

@@ -10,11 +10,9 @@ import numpy.typing as npt
 
 from ..arrays import Array
 from ..errors import InputError
+from ..given import whole
+from .law_claims import OF_TANGENTS, check_motion, check_words, place_of, taken
 from .law_info import OPEN, SLIP, LawInfo, Limit, ParameterInfo
-
-#: Of the largest real part: what a Fourier transform and its inverse leave of an imaginary one; of tangents, which
-#: may be differences.
-ROUNDING, OF_TANGENTS = 1e-12, 1e-4
 
 
 class PythonLaw:
@@ -23,6 +21,9 @@ class PythonLaw:
     Subclasses give ``force(u, v)``, and ``tangent(u, v)`` when they can: without it the tangent is a central difference
     and Newton is accurate to about 1e-9. Arrays are (n_samples, components, n_pairs). ``status`` and ``gap`` say which
     pairs stick, slip and are open in tables, pictures and views.
+
+    It is held to what it says of itself (`law_claims`): a force of other shape, odd or with a memory against its word
+    is refused.
 
     With `register_law` a case names it as any other; it is then made with its parameters as keywords, each (n_pairs,).
 
@@ -60,7 +61,7 @@ class PythonLaw:
 
     def __init_subclass__(cls, **given: object) -> None:
         super().__init_subclass__(**given)
-        if cls.components > 1 and "normal" not in vars(cls) and cls.normal is None:
+        if (whole(cls.components) or 0) > 1 and "normal" not in vars(cls) and cls.normal is None:
             cls.normal = 0
 
     def __repr__(self) -> str:
@@ -103,18 +104,36 @@ class PythonLaw:
             step = np.zeros_like(moved)
             step[:, column] = 6e-6 * max(float(np.abs(moved).max(initial=0.0)), 1e-12)
             moves = [(u + s, v.copy()) if which == 0 else (u.copy(), v + s) for s in (step, -step)]
-            plus, minus = (np.array(self.force(*moved)) for moved in moves)
+            plus, minus = (self._force(*moved) for moved in moves)
             columns.append((plus - minus) / (2 * step[:, column : column + 1]))
         return np.stack(columns, axis=2)
 
     def _evaluate(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
         """What the compiled core calls for the force."""
-        f, (df_du, df_dv) = np.array(self.force(*_copies(u, v))), self.tangent(*_copies(u, v))
-        return _contiguous(f), _contiguous(df_du, OF_TANGENTS), _contiguous(df_dv, OF_TANGENTS)
+        f, tangents = self._force(*_copies(u, v)), self._tangents(u, v)
+        check_motion(self, u, v, f)
+        return f, *tangents
+
+    def _force(self, u: Array, v: Array) -> Array:
+        return np.array(
+            taken(self, "a force", self.force(u, v), u.shape)
+        )  # a law may keep, and fill again, what it gave
+
+    def _tangents(self, u: Array, v: Array) -> tuple[Array, Array]:
+        given = self.tangent(*_copies(u, v))
+        if not isinstance(given, (tuple, list)) or len(given) != 2:
+            what, fix = "a law in Python returned no two tangents", "return both, or leave `tangent` out"
+            raise InputError(what, place_of(self), type(given).__name__, "(df/du, df/dv)", fix)
+        shape = (len(u), self.components, self.components, u.shape[2])
+        df_du, df_dv = (taken(self, "a tangent", one, shape, OF_TANGENTS) for one in given)
+        return df_du, df_dv
 
     def _states(self, u: Array, v: Array, f: Array) -> tuple[Array, Array]:
         """What it calls for status and gap."""
-        return _contiguous(self.status(*_copies(u, v, f))), _contiguous(self.gap(*_copies(u, v, f)))
+        shape, given = (len(u), u.shape[2]), _copies(u, v, f)
+        return taken(self, "a status", self.status(*given), shape), taken(
+            self, "a gap", self.gap(*_copies(u, v, f)), shape
+        )
 
 
 def _copies(*values: Array) -> list[Array]:
@@ -122,18 +141,16 @@ def _copies(*values: Array) -> list[Array]:
     return [one.copy() for one in values]
 
 
-def _contiguous(values: npt.ArrayLike, rounding: float = ROUNDING) -> Array:
-    if np.iscomplexobj(values):  # NumPy would keep the real part
-        if abs(np.imag(values)).max(initial=0.0) > rounding * abs(np.real(values)).max(initial=0.0):
-            what, fix = "a law in Python returned complex values", "return real forces; damping is a force of v"
-            raise InputError(what, None, "complex", "real arrays of the shape of u", fix)
-        values = np.real(values)
-    return np.ascontiguousarray(values, dtype=float)
-
-
 def python_law(law: PythonLaw, pairs: npt.NDArray[np.intp]) -> Any:
-    """A law in Python as the core takes it."""
+    """A law in Python as the core takes it.
+
+    Raises
+    ------
+    InputError
+        Its attributes are not what the core can take.
+    """
     from .. import _core
 
+    check_words(law)
     law.pairs = pairs
     return _core.python_law(law, len(pairs))

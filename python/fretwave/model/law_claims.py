@@ -1,0 +1,102 @@
+"""What a contact law in Python says of itself, held against what it gives: the core takes it at its word."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Array
+from ..errors import InputError
+from ..given import masked, real, whole
+from ..texts import shortened
+
+if TYPE_CHECKING:
+    from .python_law import PythonLaw
+
+#: Of the largest force: what two answers to one motion may differ by. Of the largest real part: what a Fourier
+#: transform and its inverse leave of an imaginary one; of tangents, which may be differences.
+SAME, ROUNDING, OF_TANGENTS = 1e-6, 1e-12, 1e-4
+MEMORY = "a law with a memory is a compiled one (src/CONTRIBUTING.md); else return what u and v of a sample alone give"
+
+
+def check_words(law: PythonLaw) -> None:
+    """Its attributes are what the core can take.
+
+    Raises
+    ------
+    InputError
+    """
+    count, stiff = whole(law.components) or 0, law.stuck_stiffness
+    stiff_enough = real(stiff, in_array=True) is not None or np.array_equal(stiff, np.inf)
+    wanted = {
+        "components": (count >= 1, "a whole number >= 1", "say how many directions a pair has"),
+        "normal": (
+            law.normal is None or whole(law.normal) in range(count),
+            f"None, or 0 to {count - 1}",
+            "say which component is along the normal",
+        ),
+        "odd": (isinstance(law.odd, (bool, np.bool_)), "True or False", "say whether f(-u, -v) = -f(u, v)"),
+        "stuck_stiffness": (stiff_enough, "a number, or inf", "give the stiffness of the closed contact"),
+    }
+    for name, (good, expected, fix) in wanted.items():
+        if not good:
+            measured = shortened(repr(getattr(law, name)))
+            raise InputError(f"`{name}` of a law in Python is wrong", place_of(law), measured, expected, fix)
+
+
+def taken(
+    law: PythonLaw, what: str, values: npt.ArrayLike, shape: tuple[int, ...], rounding: float = ROUNDING
+) -> Array:
+    """Values that a law gave as an array of real numbers, of which axes of length one may be missing.
+
+    Raises
+    ------
+    InputError
+    """
+    found, where = np.asanyarray(values), place_of(law)
+    if found.dtype.kind not in "biufc" or masked(found):
+        kind, fix = "masked values" if masked(found) else found.dtype.name, "return an array of numbers"
+        raise InputError(f"a law in Python returned {what} that is no number", where, kind, "real numbers", fix)
+    if np.squeeze(np.empty(found.shape, "b")).shape != np.squeeze(np.empty(shape, "b")).shape:
+        fix = f"return {what} with these axes, the last of them the pairs"
+        raise InputError(f"a law in Python returned {what} of another shape", where, found.shape, shape, fix)
+    if np.iscomplexobj(found):  # NumPy would keep the real part
+        if abs(np.imag(found)).max(initial=0.0) > rounding * abs(np.real(found)).max(initial=0.0):
+            fix = "return real forces; damping is a force of v"
+            raise InputError("a law in Python returned complex values", where, "complex", "real arrays", fix)
+        found = np.real(found)
+    return np.ascontiguousarray(found, dtype=float).reshape(shape)
+
+
+def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
+    """One sample of it gives the same force by itself, and of an odd law its mirror the opposite one.
+
+    Raises
+    ------
+    InputError
+    """
+    moving = (np.abs(u) * np.abs(v)).max(axis=(1, 2), initial=0.0)  # not at rest: a step of a force may be there
+    if not moving.any():
+        return
+    at = slice(int(np.argmax(moving)), int(np.argmax(moving)) + 1)
+    if not _same(_alone(law, u[at], v[at]), f[at], f):
+        what = "the force of a law in Python depends on more than the present displacement and velocity"
+        raise InputError(what, place_of(law), "a sample by itself has another force", "the same force", MEMORY)
+    if law.odd and not _same(-_alone(law, -u[at], -v[at]), f[at], f):
+        what, fix = "a law in Python says `odd = True`, and is not", "leave `odd` out, or say False"
+        raise InputError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
+
+
+def _alone(law: PythonLaw, u: Array, v: Array) -> Array:
+    return taken(law, "a force", law.force(u.copy(), v.copy()), u.shape)
+
+
+def _same(one: Array, other: Array, among: Array) -> bool:
+    return not np.any(np.abs(one - other) > SAME * np.abs(among).max(initial=0.0))
+
+
+def place_of(law: PythonLaw) -> str:
+    """Of messages."""
+    return f"law '{law.name or type(law).__name__}'"

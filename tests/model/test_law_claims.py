@@ -1,0 +1,151 @@
+"""A law in Python is held to what it says of itself: the core would compute another one without a word."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fretwave as fw
+
+pytestmark = pytest.mark.ranks(1)
+
+
+class Cubic(fw.PythonLaw):
+    """Two components of three pairs."""
+
+    odd, stuck_stiffness, components, normal = True, 0.0, 2, None
+
+    def force(self, u: Any, v: Any) -> Any:
+        return 0.5 * u**3
+
+    def tangent(self, u: Any, v: Any) -> Any:
+        slope = np.zeros((len(u), 2, 2, u.shape[2]))
+        slope[:, 0, 0], slope[:, 1, 1] = (1.5 * u[:, k] ** 2 for k in range(2))
+        return slope, 0.0 * slope
+
+
+class NotOdd(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        return 0.5 * u**3 + 0.6 * u**2
+
+
+class Turned(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        return super().force(u, v).transpose(0, 2, 1)
+
+
+class TurnedTangent(Cubic):
+    def tangent(self, u: Any, v: Any) -> Any:
+        return [one.transpose(3, 1, 2, 0) for one in super().tangent(u, v)]
+
+
+class OneTangent(Cubic):
+    def tangent(self, u: Any, v: Any) -> Any:
+        return super().tangent(u, v)[0]
+
+
+class Masked(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        return np.ma.masked_where(u > 0.05, super().force(u, v))
+
+
+class Words(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        return np.full(u.shape, "a")
+
+
+class Counting(Cubic):
+    calls = 0
+
+    def force(self, u: Any, v: Any) -> Any:
+        self.calls += 1
+        return 0.5 * u**3 * (1 + 1e-3 * self.calls)
+
+
+class Slider(Cubic):
+    """A memory, along the samples of two periods."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        f, at = np.empty_like(u), np.zeros_like(u[0])
+        for k in [*range(len(u)), *range(len(u))]:
+            f[k] = np.clip(0.5 * (u[k] - at), -0.02, 0.02)
+            at = u[k] - f[k] / 0.5
+        return f
+
+
+def followed(law: fw.PythonLaw) -> fw.Branch:
+    model = fw.Model(np.eye(6), np.diag(1.0 + np.arange(6)) + 0.1, contacts=[fw.Contact(law, np.eye(6))])
+    mode = fw.NonlinearMode(model, fw.choose_harmonics(model, 3, samples=64), dof=0)
+    return fw.follow(mode, 0.1, 1.0, errors=False)
+
+
+WRONG = {
+    NotOdd: "says `odd = True`, and is not",
+    Turned: "returned a force of another shape",
+    TurnedTangent: "returned a tangent of another shape",
+    OneTangent: "returned no two tangents",
+    Masked: "returned a force that is no number",
+    Words: "returned a force that is no number",
+    Counting: "depends on more than the present",
+    Slider: "depends on more than the present",
+}
+
+
+@pytest.mark.parametrize("law", WRONG, ids=lambda law: law.__name__)
+def test_a_law_that_is_not_what_it_says_is_refused(law: type[Cubic]) -> None:
+    """One that is not odd had 8 % of negative damping without any; numbers of other pairs acted on these."""
+    with pytest.raises(fw.InputError, match=WRONG[law]) as error:
+        followed(law())
+    assert law.__name__ in str(error.value) and error.value.fix
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("normal", 5), ("odd", "no"), ("odd", 1), ("stuck_stiffness", np.nan), ("stuck_stiffness", None)],
+    ids=["normal", "text", "one", "nan", "none"],
+)
+def test_attributes_of_another_kind_are_refused(name: str, value: Any) -> None:
+    with pytest.raises(fw.InputError, match=f"`{name}` of a law in Python"):
+        followed(type("Odd", (Cubic,), {name: value})())
+
+
+class Unlike(Cubic):
+    """The same law: not odd by its own word, in single precision, as lists, as it jumps at rest."""
+
+    odd = False
+
+
+class Single(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        return super().force(u, v).astype(np.float32)
+
+
+class Lists(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        return super().force(u, v).tolist()
+
+
+class Jumping(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        return super().force(u, v) + 1e-12 * np.where(v >= 0, 1.0, -1.0) * np.abs(u)
+
+
+@pytest.mark.parametrize("law", [Unlike, Single, Lists, Jumping], ids=lambda law: law.__name__)
+def test_a_law_that_is_what_it_says_is_taken(law: type[Cubic]) -> None:
+    one, other = followed(law()), followed(Cubic())
+    assert one.converged and one["omega"][-1] == pytest.approx(other["omega"][-1], rel=1e-6)
+
+
+def test_axes_of_length_one_may_be_missing() -> None:
+    """Of one component and one pair, also where its tangent is found by differences."""
+
+    class Flat(fw.PythonLaw):
+        odd, stuck_stiffness = True, 0.0
+
+        def force(self, u: Any, v: Any) -> Any:
+            return 0.5 * u.ravel() ** 3
+
+    f, df_du, _ = Flat()._evaluate(u := np.linspace(0.1, 1.0, 5)[:, None, None], 0 * u)
+    assert f == pytest.approx(0.5 * u**3) and df_du[:, 0] == pytest.approx(1.5 * u**2, rel=1e-8)
