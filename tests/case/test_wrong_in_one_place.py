@@ -93,6 +93,26 @@ def test_a_speed_as_a_key_is_one(speed: str, table: str, tmp_path: Path, capfd) 
     assert f"'{speed}' is no speed of a turning model" in error and "1e-30 to 1e+30" in error
 
 
+#: Base -> where a number of it stands: of a dict, of an analysis that a plug-in brings, of a builder's options.
+NUMBERS = {
+    "speed": ("analysis", 3, "force", "t"),
+    "filed": ("analysis", 0, "frequency", 0),
+    "solid": ("model", "options", "sectors"),
+}
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")], ids=str)
+@pytest.mark.parametrize("base", NUMBERS)
+def test_a_number_that_is_not_finite_is_told(base: str, value: float, tmp_path: Path, capfd) -> None:
+    """A force of nan had no errors, and its run failed; keys of plug-ins took any."""
+    case = holder = bases.SHORT[base]()
+    for part in NUMBERS[base][:-1]:
+        holder = holder[part]
+    holder[NUMBERS[base][-1]] = value
+    error = checked(tmp_path, base, case, capfd)
+    assert "finite number" in error and error.count("fix:") == 1
+
+
 def test_every_key_of_a_case_is_in_one_that_is_made_wrong() -> None:
     """But for the parameters of all laws: a key that no right case has is never made wrong."""
     schema = json.loads(SHIPPED.read_text(encoding="utf-8"))

@@ -100,8 +100,9 @@ def _checked(
             values[name] = TypeAdapter(known[name]).validate_python(value)
         except ValidationError as error:
             rule = "; ".join(sorted({item["msg"] for item in error.errors(include_url=False)}))
-            measured = toml(at(source.data, path))
-            found.append(InputError(f"the option '{name}' has a wrong value", source.where(path), measured, rule))
+            what, measured = f"the option '{name}' has a wrong value", toml(at(source.data, path))
+            fix = f"write what {function.__name__}() in {display(Path(str(module.__file__)))} takes for it"
+            found.append(InputError(what, source.where(path), measured, rule, fix))
     return values
 
 

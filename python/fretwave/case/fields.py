@@ -52,7 +52,8 @@ def _with_a_square(speed: float) -> float:
 Speed = Annotated[float, Field(gt=0, le=FASTEST), AfterValidator(_with_a_square)]
 SpeedOrRest = Annotated[float, Field(ge=0, le=FASTEST), AfterValidator(_with_a_square)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Matrix = Union[str, list[list[float]]]
+#: A number that is none is told by its row and column.
+Matrix = Union[str, list[list[Annotated[float, Field(allow_inf_nan=True)]]]]
 LoadVector = Union[str, list[Finite]]
 Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 ByMode = Union[Ratio, Annotated[list[Ratio], Field(min_length=1)], Annotated[dict[str, Ratio], Field(min_length=1)]]
@@ -70,6 +71,6 @@ def key(doc: str, unit: str | None = None, example: str | None = None, **rules: 
 
 
 class Section(BaseModel):
-    """A table of the case file: no unknown keys, no silent conversion of types."""
+    """A table of the case file: no unknown keys, no silent conversion of types, no number that is not finite."""
 
-    model_config = ConfigDict(extra="forbid", strict=True)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
