@@ -104,6 +104,9 @@ def test_damping_has_shares_of_both_matrices(write) -> None:
     assert abs(case.damping_with(()) - wanted).max() <= LAST_BIT * abs(wanted).max()
 
 
+AS_BUILT = "write what the builder's build() takes for it"
+
+
 def test_options_reach_the_builder_with_their_types(write) -> None:
     case = load_case(write(), ["model.options.masses=3", "model.options.mass=2", "model.options.tilt=[1, 2]"])
     assert len(case.dofs) == 9
@@ -115,7 +118,9 @@ def test_options_reach_the_builder_with_their_types(write) -> None:
     ("override", "what", "fix"),
     [
         ("model.options.maas=2", "unknown option 'maas'", "did you mean `mass`?"),
-        ("model.options.masses=2.5", "the option 'masses' has a wrong value", None),
+        ("model.options.masses=2.5", "the option 'masses' has a wrong value", AS_BUILT),
+        ('model.options.masses="3"', "the option 'masses' has a wrong value", AS_BUILT),
+        ("model.options.mass=true", "the option 'mass' has a wrong value", AS_BUILT),
         ("model.options.masses=1", "the chain is too short", "lengthen it"),
         ("model.options.mass=-1", "the builder failed: ValueError: no mass", None),
     ],

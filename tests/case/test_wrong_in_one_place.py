@@ -93,11 +93,10 @@ def test_a_speed_as_a_key_is_one(speed: str, table: str, tmp_path: Path, capfd) 
     assert f"'{speed}' is no speed of a turning model" in error and "1e-30 to 1e+30" in error
 
 
-#: Base -> where a number of it stands: of a dict, of an analysis that a plug-in brings, of a builder's options.
+#: Base -> where a number of it stands: of a dict, of an analysis that a plug-in brings.
 NUMBERS = {
     "speed": ("analysis", 3, "force", "t"),
     "filed": ("analysis", 0, "frequency", 0),
-    "solid": ("model", "options", "sectors"),
 }
 
 

@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
+from pydantic_core import to_json
 
 from ..errors import FretwaveError, InputError
 from ..model.structure import Structure
@@ -97,11 +98,12 @@ def _checked(
             )
             continue
         try:
-            values[name] = TypeAdapter(known[name]).validate_python(value)
+            given = to_json(value, inf_nan_mode="constants")  # of JSON a list may be a tuple, and no text a number
+            values[name] = TypeAdapter(known[name]).validate_json(given, strict=True)
         except ValidationError as error:
             rule = "; ".join(sorted({item["msg"] for item in error.errors(include_url=False)}))
             what, measured = f"the option '{name}' has a wrong value", toml(at(source.data, path))
-            fix = f"write what {function.__name__}() in {display(Path(str(module.__file__)))} takes for it"
+            fix = f"write what the builder's {function.__name__}() takes for it"
             found.append(InputError(what, source.where(path), measured, rule, fix))
     return values
 
