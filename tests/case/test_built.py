@@ -153,6 +153,7 @@ def test_wrong_options(write, override: str, what: str, fix: str | None) -> None
         ([("per_area = 2e10", "per_area = 2e10\ntangential_stiffness = 1e6")], "given twice", None),
         ([("per_area = 2e10", "per_ara = 2e10")], "unknown key 'tangential_stiffness_per_ara'", None),
         ([('loads = ["weight"]', 'loads = ["wait"]')], "is no load of the model", "wait"),
+        ([('loads = ["weight"]', 'loads = ["weight", "weight"]')], "is named twice, and would act twice", "weight"),
         ([("modes = 6", "modes = 6\nup_to_hz = 400.0")], "is given beside modes", "400"),
         ([('preload = { pair_loads = false, loads = ["weight"] }\n', "")], "has no load to act on", "[0.5, 1.0]"),
         ([('normalise = "tip"', 'normalise = "top"')], "unknown dof 'top'", None),

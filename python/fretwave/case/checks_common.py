@@ -55,8 +55,11 @@ def _check_petsc(report: Reporter, analysis: AnalysisSection) -> None:
 
 
 def check_loads(report: Reporter, section: Optional[PreloadSection], known: Sequence[str]) -> None:
-    """Loads come with the model."""
-    for index, name in enumerate(section.loads if section else []):
+    """Loads come with the model; each acts once."""
+    given = section.loads if section else []
+    for index, name in enumerate(given):
+        if name in given[:index]:
+            report.wrong(("loads", index), "is named twice, and would act twice", "each load once", "leave it out")
         if name not in known:
             fix = nearest(name, list(known)) or "static loads come with a model that is built"
             named = ", ".join(known) or "(there is none)"
