@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
-from ..errors import InputError
 from ..given import whole
-from .law_claims import OF_TANGENTS, check_motion, check_words, place_of, taken
+from .law_claims import OF_TANGENTS, LawError, check_motion, check_words, place_of, taken
 from .law_info import OPEN, SLIP, LawInfo, Limit, ParameterInfo
 
 
@@ -123,7 +122,7 @@ class PythonLaw:
         given = self.tangent(*_copies(u, v))
         if not isinstance(given, (tuple, list)) or len(given) != 2:
             what, fix = "a law in Python returned no two tangents", "return both, or leave `tangent` out"
-            raise InputError(what, place_of(self), type(given).__name__, "(df/du, df/dv)", fix)
+            raise LawError(what, place_of(self), type(given).__name__, "(df/du, df/dv)", fix)
         shape = (len(u), self.components, self.components, u.shape[2])
         df_du, df_dv = (taken(self, "a tangent", one, shape, OF_TANGENTS) for one in given)
         return df_du, df_dv
