@@ -172,6 +172,7 @@ def _follow(
     reports = sorted({*analysis.report_at, *([] if error_at is None else [error_at])})
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
     guess = None if found else from_one_sector(context, problem, start)
+    stiffness = problem.core.stiffness_scale  # of the structure: along the branch its rows may be measured in others
     branch = continuation(context, problem, (low, high), reports, snapshot, found, guess=guess)
     around = None
     if context.case.wheel is not None:
@@ -194,7 +195,7 @@ def _follow(
     tell(context, branch)
     outcome = _finish(context, writer, branch, start, problem)
     if not branch.converged:
-        outcome.reason += suspected(branch, problem.core.stiffness_scale, units)
+        outcome.reason += suspected(branch, stiffness, units)
     outcome.goal = f"amplitude {high:g} {unit}"
     branch.destroy()
     return outcome
