@@ -136,7 +136,7 @@ _ALL = (
     Column("slip", "1", "share of the period that contact pairs slip"),
     Column("open", "1", "share of the period that contact pairs are open"),
     Column("omega_error", "rad/s", "estimated error of omega: modulus of that of lambda"),
-    Column("zeta_error", "1", "estimated error of zeta: that of lambda over omega0"),
+    Column("zeta_error", "1", "estimated error of zeta: that of lambda over omega0 (EPMC above 1: by beta and omega0)"),
     Column("amplitude_error", "length", "estimated error of the complex amplitude, modulus"),
     *(
         Column(f"{what}_error_{source}", unit, f"estimated error of {name} by {why}")

@@ -81,14 +81,21 @@ class ModalState(_Columns):
         """Errors of these scalars in columns, from their changes by all sources and by each of `SOURCES`.
 
         Of the complex eigenvalue by source [1/s]; of omega and zeta those of its modulus, |d omega| <= |d lambda| and
-        |d zeta| <= |d lambda| / omega0, for an error of zeta by itself changes its sign along a branch.
+        |d zeta| <= |d lambda| / omega0, for an error of zeta by itself changes its sign along a branch. Where EPMC's
+        zeta is 1 or more lambda says nothing of w, and |d zeta| <= (|d beta| + zeta |d w|) / w.
         """
         here = self.eigenvalue(z)
         # NumPy's: Python 3.11's own abs of nan overflows where something before it has set errno
         error, *parts = (float(np.abs(self.eigenvalue(z + change) - here)) for change in changes)
-        omega0 = float(np.abs(here))
         own = {self.error_by.format(source): part for source, part in zip(SOURCES, parts)}
-        return {"omega_error": error, "zeta_error": error / omega0 if omega0 else math.nan, **own}
+        of_zeta = self._creeping(z, changes[0]) if self.method == "EPMC" and not here.imag else error
+        size = float(self._oscillation(z)[2])
+        return {"omega_error": error, "zeta_error": of_zeta / size if size else math.nan, **own}
+
+    def _creeping(self, z: Array, change: Array) -> float:
+        """Error of zeta times w [1/s] where the free motion does not oscillate."""
+        d_beta, d_w = np.abs(np.asarray(change, dtype=float)[:2]) * self.omega_reference
+        return float(d_beta + np.abs(self._oscillation(z)[3]) * d_w)
 
     def relative(self, z: Array) -> Array:
         """That takes a change of the scalars to its relative size: amplitude (times `STRICT`), lambda over zeta omega0.
@@ -98,8 +105,8 @@ class ModalState(_Columns):
         """
         beta, omega, omega0, zeta = self._oscillation(z)
         size = omega0 * min(max(abs(zeta), ZETA_FLOOR), 1.0) / self.omega_reference
-        # omega^2 = w^2 - beta^2 for EPMC, above zeta = 1 it is zero
-        by_beta, by_w = (0.0, 1.0) if self.method == "CNM" else (-beta / omega, omega0 / omega) if omega else (0.0, 0.0)
+        # omega^2 = w^2 - beta^2 for EPMC, above zeta = 1 it is zero and w stands for itself
+        by_beta, by_w = (-beta / omega, omega0 / omega) if self.method == "EPMC" and omega else (0.0, 1.0)
         return np.array([[0.0, 0.0, STRICT], [-1.0 / size, 0.0, 0.0], [by_beta / size, by_w / size, 0.0]])
 
     def eigenvalue(self, z: npt.ArrayLike) -> complex:
