@@ -27,6 +27,10 @@ FREE = "mean position is free"
 RETURNS = re.compile("comes back to|back onto itself|a closed loop")
 #: What is said of a mode that loses no energy.
 LEADS_OVER = "the motion loses no energy: a mode without damping leads over into another one at internal resonances"
+#: What is said where rounding is no small part of the forces.
+HIDES = "rounding beside the stiffest springs hides"
+#: Share of the forces that rounding leaves in them, above which steps may find no way on.
+HIDDEN = 3e-8
 #: Contact stiffness over the structure's from which a pair that opens, sticks or slips changes all forces.
 STIFF = 1e4
 #: Contact stiffness over the structure's below which it holds nothing.
@@ -61,6 +65,15 @@ def vanishing(problem: HarmonicProblem, y: PETSc.Vec) -> str:
         f"; the slip of a pair of contact '{name}' vanishes here, which alone tells where its slider stands"
         for name in comm.bcast(names)
     )
+
+
+def hidden(problem: HarmonicProblem, y: PETSc.Vec) -> str:
+    """How much of the forces rounding hides at y, where a branch stopped, or nothing where that is little. Collective.
+
+    Springs far stiffer than what moves, which join two dofs, leave eps times their force on each of them.
+    """
+    share = problem.core.rounding(y)
+    return f"; {HIDES} {share:.0e} of the forces here" if share > HIDDEN else ""
 
 
 def lossless(problem: HarmonicProblem, y: PETSc.Vec) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..analyses.parts.context import Outcome
 from ..errors import NotConverged
-from ..hb.suspects import FREE, LEADS_OVER
+from ..hb.suspects import FREE, HIDES, LEADS_OVER
 from ..mpi.petsc_share import prefix_of
 
 #: A loop may end within itself, and an internal resonance lead to another mode.
@@ -59,6 +59,8 @@ def advice(name: str, reason: str) -> str:
     if any(ending in reason for ending in ("a closed loop", "back onto itself", "turns in circles")):
         shorter = f"--set {name}.step.initial=0.01 --set {name}.step.maximum=0.03"
         return f"{_other_end(name, reason)}shorter steps ({shorter}): one may have led onto another curve"
+    if HIDES in reason:
+        return "softer links (1e6 times as stiff as what they join is rigid), or one dof in place of those they join"
     if "comes back to amplitude" in reason:
         return f"--set {name}.normalise=... to a dof that goes on growing with the motion, shorter steps, or {OVER}"
     return (

@@ -13,7 +13,7 @@ from ...case.analysis_tables import StepSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...errors import InputError
-from ...hb.suspects import FREE, RETURNS, TOO_SMALL, lossless, suspects, vanishing
+from ...hb.suspects import FREE, RETURNS, TOO_SMALL, hidden, lossless, suspects, vanishing
 from ...mpi.destroyable import Owned
 from ...mpi.log import event
 from ...mpi.spread import Spread
@@ -91,9 +91,10 @@ def suspected(branch: Continuation, stiffness: float, units: UnitSystem) -> str:
     """
     if FREE in branch.reason:
         return ""
-    ask = vanishing if branch.reason.startswith(TOO_SMALL) else lossless if RETURNS.search(branch.reason) else None
+    returned = RETURNS.search(branch.reason) is not None
+    ask = [vanishing, hidden] if branch.reason.startswith(TOO_SMALL) else [lossless] if returned else []
     anchor = branch.anchor
-    seen = ask(branch.problem, anchor) if ask and anchor is not None else ""
+    seen = "".join(one(branch.problem, anchor) for one in ask) if anchor is not None else ""
     return seen + suspects(branch.problem.model.contacts, stiffness, units)
 
 
