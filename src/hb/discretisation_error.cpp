@@ -30,6 +30,7 @@ const Tuned cheap("error_cheap", 1e4, "unknowns of these up to which it is so fo
 const Tuned bent("error_bent", 0.2,
                  "residual that a step leaves along that which it is made for, from which it is taken anew");
 
+constexpr double aside = 1e-2;   // arclength from a point to where residuals tell how the branch bends
 constexpr double solved = 1e-2;  // of the residual: so far Newton goes on from a bent step
 constexpr double astray = 10;    // of that step: what lies farther away is another solution
 const Tuned most_steps("error_steps", 20, "Newton steps at most that go on from a bent one");
@@ -167,6 +168,24 @@ double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
   return (along - (1 - t)) / (t * t);
 }
 
+/// Of the parameter by the arclength s, of y'': J' y'' = -F'' t t, at a right angle to t, with F'' from
+/// residuals on both sides. Zero where J' is singular.
+double DiscretisationError::curvature(Vec point, Vec row, Vec tangent) {
+  VecHandle along = embedded(problem_, *finer_, tangent), curved = finer_->equations();
+  VecHandle beside = finer_->equations();
+  finer_->residual(point, curved);
+  check(VecScale(curved, -2));
+  for (double s : {aside, -aside}) {
+    finer_->residual(solve::moved(point, s, along), beside);
+    check(VecAXPY(curved, 1, beside));
+  }
+  check(VecScale(curved, 1 / (aside * aside)));
+  VecHandle b = right_side(curved), second = solve::zero_like(b);
+  newton_->system().close(row, 0);
+  const std::array<Vec, 1> right = {b}, left = {second};
+  return newton_->linear(point, right, left) ? finer_->scalars(second)[problem_.scalar_count() - 1] : 0;
+}
+
 /// The step with the Jacobian halfway to where it leads; as it was where that is singular, or its factors do
 /// not fit the memory beside the others.
 void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x) {
@@ -196,20 +215,36 @@ double size_beside(std::vector<double> v, int count) {
   return std::inner_product(v.begin(), v.end(), v.begin(), 0.0);
 }
 
-/// Scalars of dy' + s t without a change of the last of `count`, the parameter. Beside a fold neither way
-/// along the branch leads there (at the fold the sign of t is rounding's): of both ends the one that is off
-/// the most.
+/// Whether the branch leads straight to where `off` of the parameter is made up for; it turns back at folds.
+bool straight(double off, double t) {
+  return std::abs(off) <= reach * std::abs(t) && std::abs(off) <= t * t / 2;
+}
+
+/// Ways s along a branch of these slope and curvature at which off + slope s + curvature s^2 / 2 vanishes.
+/// Beside a fold, where the sign of the slope is rounding's, both of its sides; where nothing vanishes, as
+/// far to both of them as it would from the fold.
+std::vector<double> ways(double off, double slope, double curvature) {
+  const double root = slope * slope - 2 * curvature * off, far = std::sqrt(2 * std::abs(off / curvature));
+  const bool leads_there = root >= 0 && slope * slope > 2 * std::abs(curvature * off);
+  std::vector<double> found = {far, -far};
+  if (leads_there) found = {-2 * off / (slope + std::copysign(std::sqrt(root), slope))};
+  for (double& s : found) s = std::isfinite(s) ? std::clamp<double>(s, -reach, reach) : reach;
+  return found;
+}
+
+/// Scalars of dy' + s t without a change of the last of `count`, the parameter; of several such the one that
+/// is off the most.
 std::vector<double> at_parameter(std::vector<double> const& change, std::vector<double> const& tangent,
-                                 int count) {
-  const auto moved = [&](double s) {
+                                 std::function<double()> const& curvature, int count) {
+  const double off = change[count - 1], slope = tangent[count - 1];
+  std::vector<double> most;
+  for (double s :
+       straight(off, slope) ? std::vector{off == 0 ? 0 : -off / slope} : ways(off, slope, curvature())) {
     std::vector<double> there = change;
     for (size_t j = 0; j < there.size(); ++j) there[j] += s * tangent[j];
-    return there;
-  };
-  const double off = change[count - 1], t = tangent[count - 1];
-  if (std::abs(off) <= reach * std::abs(t)) return off == 0 ? change : moved(-off / t);
-  auto one = moved(reach), other = moved(-reach);
-  return size_beside(one, count) > size_beside(other, count) ? one : other;
+    if (most.empty() || size_beside(there, count) > size_beside(most, count)) most = std::move(there);
+  }
+  return most;
 }
 
 /// Of a step: where 1 - s + c s^2 first vanishes, or else is the least.
@@ -306,7 +341,11 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction
   if (!sources.empty() && sources[0] == above) check(VecScale(x[0], all_above(left[above])));
   LeftOut out;
   const auto along = problem_.scalars(tangent);
-  const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };
+  std::optional<double> found;
+  const auto curvature = [&] { return found ? *found : *(found = this->curvature(point, row, tangent)); };
+  const auto change = [&](Vec v) {
+    return at_parameter(finer_->scalars(v), along, curvature, problem_.scalar_count());
+  };
   for (size_t k = 0; k < x.size(); ++k) out.by_source[sources[k]] = change(x[k]);
   out.all = x.empty() ? std::vector<double>(along.size(), 0.0) : change(sum(x));
   for (size_t k = 0; k < left.size(); ++k)  // by the size of its residual

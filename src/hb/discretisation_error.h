@@ -23,13 +23,13 @@ struct LeftOut {
 ///
 /// closed as the continuation's: at a right angle to the branch's tangent t, for at a fold there may be
 /// nothing at the same parameter. From there the branch leads to it: dy = dy' + s t with no change of the
-/// last entry, as far as a straight line goes (|s| <= `reach`). Harmonics left out answer for -r'_new, the
-/// contact force outside the retained orders, and as much more as lies above H', samples for r - r'_old, the
-/// change of the retained rows on more samples (rounding in continuous time), and the solver for -r, what it
-/// left; what a reduction has left out of the model is given as a residual of the point's equations. A source
-/// next to nothing is not solved for and has its share of r'. Error estimation by a hierarchical basis (Bank
-/// & Smith 1993): what the estimate misses is as much smaller as the finer set is better, and the square of
-/// the error.
+/// last entry, as far as a straight line goes, and beside a fold as its parabola does (|s| <= `reach`).
+/// Harmonics left out answer for -r'_new, the contact force outside the retained orders, and as much more as
+/// lies above H', samples for r - r'_old, the change of the retained rows on more samples (rounding in
+/// continuous time), and the solver for -r, what it left; what a reduction has left out of the model is given
+/// as a residual of the point's equations. A source next to nothing is not solved for and has its share of
+/// r'. Error estimation by a hierarchical basis (Bank & Smith 1993): what the estimate misses is as much
+/// smaller as the finer set is better, and the square of the error.
 ///
 /// That square is looked at. Along the step, for equations of the second order,
 ///
@@ -62,6 +62,7 @@ class DiscretisationError {
   double bound(int order) const;
   double all_above(Vec force) const;
   double bend(Vec point, Vec r, Vec reduction, Vec step);
+  double curvature(Vec point, Vec row, Vec tangent);
   void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
   void finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most);
 

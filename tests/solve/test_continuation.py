@@ -233,7 +233,8 @@ def test_nothing_is_asked_for_beyond_the_end(comm):
 
     class Listens(TanhLaw):
         def force(self, u, v):
-            asked.append(np.abs(u).max(initial=0.0))
+            if len(u) > 1:  # else a sample of it, by itself
+                asked.append(np.abs(u).max(initial=0.0))
             return super().force(u, v)
 
     for start, upwards in ((0.1, True), (1.0, False)):
