@@ -215,7 +215,8 @@ double size_beside(std::vector<double> v, int count) {
   return std::inner_product(v.begin(), v.end(), v.begin(), 0.0);
 }
 
-/// Whether the branch leads straight to where `off` of the parameter is made up for; it turns back at folds.
+/// Whether the branch leads straight to where `off` of the parameter is made up for; it turns back at folds,
+/// as one of curvature 1 does in the second of these.
 bool straight(double off, double t) {
   return std::abs(off) <= reach * std::abs(t) && std::abs(off) <= t * t / 2;
 }
@@ -228,7 +229,7 @@ std::vector<double> ways(double off, double slope, double curvature) {
   const bool leads_there = root >= 0 && slope * slope > 2 * std::abs(curvature * off);
   std::vector<double> found = {far, -far};
   if (leads_there) found = {-2 * off / (slope + std::copysign(std::sqrt(root), slope))};
-  for (double& s : found) s = std::isfinite(s) ? std::clamp<double>(s, -reach, reach) : reach;
+  for (double& s : found) s = std::clamp<double>(s, -reach, reach);
   return found;
 }
 
@@ -238,8 +239,12 @@ std::vector<double> at_parameter(std::vector<double> const& change, std::vector<
                                  std::function<double()> const& curvature, int count) {
   const double off = change[count - 1], slope = tangent[count - 1];
   std::vector<double> most;
-  for (double s :
-       straight(off, slope) ? std::vector{off == 0 ? 0 : -off / slope} : ways(off, slope, curvature())) {
+  std::vector<double> all = {off == 0 ? 0 : -off / slope};
+  if (!straight(off, slope)) {
+    const double bend = curvature();
+    all = bend == 0 || !std::isfinite(bend) ? std::vector<double>{reach, -reach} : ways(off, slope, bend);
+  }
+  for (double s : all) {
     std::vector<double> there = change;
     for (size_t j = 0; j < there.size(); ++j) there[j] += s * tangent[j];
     if (most.empty() || size_beside(there, count) > size_beside(most, count)) most = std::move(there);

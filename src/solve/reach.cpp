@@ -72,6 +72,7 @@ std::optional<Continuation::Trial> Continuation::reach_by_steps(double target, P
     const auto on_curve = [&](double at) { return through.value(at); };
     const double goal = passing(on_curve, target, a, b.at);
     const double near = goal - a.at < b.at - goal ? a.at : b.at, place = near + share * (goal - near);
+    if (std::abs(place - near) <= value_error * (b.at - a.at)) break;
     Trial trial = at(through.value(place));
     if (!correct_inside(trial, place, b.at - a.at)) {
       share /= 2;

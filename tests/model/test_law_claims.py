@@ -128,12 +128,27 @@ class Lists(Cubic):
         return super().force(u, v).tolist()
 
 
-class Jumping(Cubic):
+class Objects(Cubic):
     def force(self, u: Any, v: Any) -> Any:
-        return super().force(u, v) + 1e-12 * np.where(v >= 0, 1.0, -1.0) * np.abs(u)
+        return super().force(u, v).astype(object)
+
+    def tangent(self, u: Any, v: Any) -> Any:
+        return np.stack(super().tangent(u, v))
 
 
-@pytest.mark.parametrize("law", [Unlike, Single, Lists, Jumping], ids=lambda law: law.__name__)
+def test_an_odd_law_may_jump_where_a_pair_rests() -> None:
+    class Jumping(fw.PythonLaw):
+        odd, stuck_stiffness = True, 0.0
+
+        def force(self, u: Any, v: Any) -> Any:
+            return 0.3 * u + 1e-2 * np.where(v >= 0, 1.0, -1.0)
+
+    phase = np.linspace(0.1, 6.0, 16)
+    u, v = (np.stack([part, 0 * part], axis=-1)[:, None] for part in (np.cos(phase), -np.sin(phase)))
+    np.testing.assert_array_equal(Jumping()._evaluate(u, v)[0], Jumping().force(u, v))
+
+
+@pytest.mark.parametrize("law", [Unlike, Single, Lists, Objects], ids=lambda law: law.__name__)
 def test_a_law_that_is_what_it_says_is_taken(law: type[Cubic]) -> None:
     one, other = followed(law()), followed(Cubic())
     assert one.converged and one["omega"][-1] == pytest.approx(other["omega"][-1], rel=1e-6)

@@ -96,8 +96,9 @@ import sys
 from petsc4py import PETSc
 from fretwave.commands.main import main
 only = ["--only", sys.argv[3]] if sys.argv[3] else []
-main(["run", sys.argv[1], "--quick", "--no-plots", "--out", sys.argv[2], *only])
+code = main(["run", sys.argv[1], "--quick", "--no-plots", "--out", sys.argv[2], *only])
 PETSc.garbage_view()
+sys.exit(code)
 """
 
 
@@ -110,3 +111,28 @@ def test_a_run_leaves_nothing_to_petsc(tmp_path, launch, ranks, case, only):
     done = launch(ranks, "-c", RUN, str(CASES / case / "case.toml"), str(tmp_path / "out"), only, timeout=200)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("Total entries: 0") == ranks, done.stdout[-2000:]
+
+
+ALONE = """
+import sys
+from mpi4py import MPI
+from petsc4py import PETSc
+from fretwave.mpi.destroyable import Owned
+
+class Meets:
+    def destroy(self):
+        MPI.COMM_WORLD.barrier()
+
+with Owned() as own:
+    own(Meets())
+    if MPI.COMM_WORLD.rank == 0:
+        raise MemoryError("of one rank alone")
+    MPI.COMM_WORLD.recv(source=0)
+"""
+
+
+@pytest.mark.ranks(1)
+def test_an_exception_of_one_rank_does_not_wait_for_the_others(launch):
+    """What is freed is freed together: a rank that waits there would keep its reason from the others."""
+    done = launch(2, "-c", "from fretwave.mpi.guard import install\ninstall()" + ALONE, timeout=30)
+    assert done.returncode != 0 and "not enough memory" in done.stderr, done.stderr

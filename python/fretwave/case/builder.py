@@ -98,14 +98,18 @@ def _checked(
             )
             continue
         try:
-            given = to_json(value, inf_nan_mode="constants")  # of JSON a list may be a tuple, and no text a number
-            values[name] = TypeAdapter(known[name]).validate_json(given, strict=True)
+            values[name] = value if known[name] is Any else _typed(value, known[name])
         except ValidationError as error:
             rule = "; ".join(sorted({item["msg"] for item in error.errors(include_url=False)}))
             what, measured = f"the option '{name}' has a wrong value", toml(at(source.data, path))
             fix = f"write what the builder's {function.__name__}() takes for it"
             found.append(InputError(what, source.where(path), measured, rule, fix))
     return values
+
+
+def _typed(value: object, kind: Any) -> object:
+    """As JSON has it: a list may be a tuple, a text a path, and no text or truth value a number."""
+    return TypeAdapter(kind).validate_json(to_json(value, inf_nan_mode="constants"), strict=True)
 
 
 def _blame(error: BaseException, path: Path, source: Source) -> InputError:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +38,7 @@ def check_words(law: PythonLaw) -> None:
     InputError
     """
     count, stiff = whole(law.components) or 0, law.stuck_stiffness
-    stiff_enough = real(stiff, in_array=True) is not None or np.array_equal(stiff, np.inf)
+    stiff_enough = real(stiff, in_array=True) is not None or (np.size(stiff) == 1 and bool(np.all(stiff == np.inf)))
     wanted = {
         "components": (count >= 1, "a whole number >= 1", "say how many directions a pair has"),
         "normal": (
@@ -44,7 +46,7 @@ def check_words(law: PythonLaw) -> None:
             f"None, or 0 to {count - 1}",
             "say which component is along the normal",
         ),
-        "odd": (isinstance(law.odd, (bool, np.bool_)), "True or False", "say whether f(-u, -v) = -f(u, v)"),
+        "odd": (isinstance(law.odd, bool), "True or False", "say whether f(-u, -v) = -f(u, v)"),
         "stuck_stiffness": (stiff_enough, "a number, or inf", "give the stiffness of the closed contact"),
     }
     for name, (good, expected, fix) in wanted.items():
@@ -63,10 +65,14 @@ def taken(
     InputError
     """
     found, where = np.asanyarray(values), place_of(law)
+    if found.dtype.kind == "O":
+        with suppress(TypeError, ValueError):
+            found = found.astype(float)
     if found.dtype.kind not in "biufc" or masked(found):
         kind, fix = "masked values" if masked(found) else found.dtype.name, "return an array of numbers"
         raise LawError(f"a law in Python returned {what} that is no number", where, kind, "real numbers", fix)
-    if np.squeeze(np.empty(found.shape, "b")).shape != np.squeeze(np.empty(shape, "b")).shape:
+    flat = found.shape == (math.prod(shape),)
+    if not flat and np.squeeze(np.empty(found.shape, "b")).shape != np.squeeze(np.empty(shape, "b")).shape:
         fix = f"return {what} with these axes, the last of them the pairs"
         raise LawError(f"a law in Python returned {what} of another shape", where, found.shape, shape, fix)
     if np.iscomplexobj(found):  # NumPy would keep the real part
@@ -84,14 +90,16 @@ def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
     ------
     InputError
     """
-    moving = (np.abs(u) * np.abs(v)).max(axis=(1, 2), initial=0.0)  # not at rest: a step of a force may be there
+    # pairs of which nothing rests: a step of a force may be there
+    moving = ((u != 0) & (v != 0)).all(axis=1)
     if not moving.any():
         return
-    at = slice(int(np.argmax(moving)), int(np.argmax(moving)) + 1)
+    sample = int(np.argmax(np.where(moving, np.abs(u).min(axis=1), 0.0).max(axis=1)))
+    at, pairs = slice(sample, sample + 1), moving[sample]
     if not _same(_alone(law, u[at], v[at]), f[at], f):
         what = "the force of a law in Python depends on more than the present displacement and velocity"
         raise LawError(what, place_of(law), "a sample by itself has another force", "the same force", MEMORY)
-    if law.odd and not _same(-_alone(law, -u[at], -v[at]), f[at], f):
+    if law.odd and not _same(-_alone(law, -u[at], -v[at])[..., pairs], f[at][..., pairs], f):
         what, fix = "a law in Python says `odd = True`, and is not", "leave `odd` out, or say False"
         raise LawError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
 
@@ -101,7 +109,8 @@ def _alone(law: PythonLaw, u: Array, v: Array) -> Array:
 
 
 def _same(one: Array, other: Array, among: Array) -> bool:
-    return not np.any(np.abs(one - other) > SAME * np.abs(among).max(initial=0.0))
+    with np.errstate(all="ignore"):
+        return not np.any(np.abs(one - other) > SAME * np.abs(among).max(initial=0.0))
 
 
 def place_of(law: PythonLaw) -> str:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from typing import NoReturn, Protocol, TypeVar
+from typing import Any, NoReturn, Protocol, TypeVar
 
-from ..errors import InputError
+from ..errors import FretwaveError, InputError
 
 Own = TypeVar("Own", bound="Destroyable")
 
@@ -28,6 +28,12 @@ class Owned(ExitStack):
     def __call__(self, thing: Thing) -> Thing:
         self.callback(thing.destroy)
         return thing
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+        """An exception of one rank alone must reach the others before it waits for them."""
+        if kind is not None and not issubclass(kind, FretwaveError):
+            self.pop_all()
+        super().__exit__(kind, *rest)
 
 
 def destroyed(what: str) -> InputError:

@@ -90,7 +90,7 @@ class Continuation:
         asked = [*stop, ways, *astuple(control), *reports]
         expect_same(problem.model.comm, "the ends, reports and steps of a branch", asked)
         with_a_square("an end of the branch", max(1.0, *(end for end in stop if end < np.inf)), "choose other units")
-        self.problem, self._y0, self._low, self._high = problem, y0.copy(), low, high
+        self.problem, self._low, self._high = problem, low, high
         self._core = _core.Continuation(problem.core, problem.prefix, low, high, control.core(), reports)
         if way:
             self._core.follow_as_way()
@@ -102,7 +102,7 @@ class Continuation:
         self.resumed_at: tuple[PETSc.Vec, PETSc.Vec] | None = None
         self.way, self.started, self._first_reason = way, "", ""
         self._last: PETSc.Vec | None = None
-        self._over = False
+        self._over, self._y0 = False, y0.copy()
 
     def __repr__(self) -> str:
         if self._core is None:
@@ -234,7 +234,8 @@ class Continuation:
 
         On the same ranks and the direct route the branch is the same bit for bit; elsewhere (another number of ranks,
         or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
-        before, solved again, to measure that by; `resumed_at` are unknowns and tangent there.
+        before, solved again, to measure that by; `resumed_at` are unknowns and tangent there. Both live as long as the
+        branch does.
         """
         given = cls._told(problem, snapshot)
         with Owned() as own:

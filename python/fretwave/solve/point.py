@@ -12,7 +12,8 @@ from .trace import Knot
 
 @dataclass
 class Point:
-    """A converged point of a branch. `y` and `tangent` are the caller's to keep or `destroy`.
+    """A converged point of a branch. `y` and `tangent` are the caller's to keep or, once the next point is
+    there, to `destroy` (`points_of` does).
 
     Attributes
     ----------

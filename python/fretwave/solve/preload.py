@@ -170,7 +170,8 @@ def static_preload(
     with Owned() as own:
         problem, branch, first = begin(1.0)
         if first is not None and (times := _times(first, branch)) > FAR:
-            own(first)
+            first.destroy()
+            branch.destroy()
             problem, branch, first = begin(times)
         last, reason = None, ""
         for point in chain([] if first is None else [first], branch):
