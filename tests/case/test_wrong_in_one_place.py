@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from command_line import call
 
+from fretwave.case import plugins
 from fretwave.case.json_schema import SHIPPED
 
 ROOT = Path(__file__).parents[2]
@@ -30,10 +31,12 @@ WRONG_ROWS = {
 
 
 def checked(folder: Path, base: str, case: dict[str, Any], capfd: Any) -> str:
-    """What `check` says of a case that is wrong in one place."""
+    """What `check` says of a case that is wrong in one place; its plug-ins are forgotten."""
     bases.prepare(folder)
     (folder / base / "case.toml").write_text(as_toml(case), encoding="utf-8")
     assert call("check", folder / base / "case.toml") == 2
+    for plugin in plugins.loaded():
+        plugins.forget(plugin.path)
     return str(capfd.readouterr().err)
 
 
