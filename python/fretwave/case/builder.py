@@ -98,7 +98,7 @@ def _checked(
             )
             continue
         try:
-            values[name] = value if known[name] is Any else _typed(value, known[name])
+            values[name] = value if known[name] is Any else _read(TypeAdapter(known[name]), value)
         except ValidationError as error:
             rule = "; ".join(sorted({item["msg"] for item in error.errors(include_url=False)}))
             what, measured = f"the option '{name}' has a wrong value", toml(at(source.data, path))
@@ -107,9 +107,9 @@ def _checked(
     return values
 
 
-def _typed(value: object, kind: Any) -> object:
-    """As JSON has it: a list may be a tuple, a text a path, and no text or truth value a number."""
-    return TypeAdapter(kind).validate_json(to_json(value, inf_nan_mode="constants"), strict=True)
+def _read(kind: TypeAdapter[object], value: object) -> object:
+    """As of JSON: a list may be a tuple, a text a path, and no text or truth value a number."""
+    return kind.validate_json(to_json(value, inf_nan_mode="constants"), strict=True)
 
 
 def _blame(error: BaseException, path: Path, source: Source) -> InputError:

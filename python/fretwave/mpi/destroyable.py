@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from typing import Any, NoReturn, Protocol, TypeVar
+from types import TracebackType
+from typing import NoReturn, Protocol, TypeVar
 
 from ..errors import FretwaveError, InputError
 
@@ -29,11 +30,13 @@ class Owned(ExitStack):
         self.callback(thing.destroy)
         return thing
 
-    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """An exception of one rank alone must reach the others before it waits for them."""
         if kind is not None and not issubclass(kind, FretwaveError):
             self.pop_all()
-        super().__exit__(kind, *rest)
+        super().__exit__(kind, error, trace)
 
 
 def destroyed(what: str) -> InputError:
