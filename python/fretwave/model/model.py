@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..given import LARGEST, array_of, masked, whole, with_a_square
 from ..kinds import of_their_kinds
 from ..mpi import guard as parallel
-from ..mpi.destroyable import Destroyable, destroyed
+from ..mpi.destroyable import Destroyable, Owned, destroyed
 from ..mpi.gather import on_all_ranks
 from ..texts import shortened
 from ..units import SI, UnitSystem, unit_system
@@ -300,10 +300,8 @@ class Model(Destroyable):
     @contextmanager
     def vectors(self, *values: Array) -> Iterator[list[PETSc.Vec]]:
         """`vector` of each array, for a `with` block that they do not outlive. Collective."""
-        made = [self.vector(one) for one in values]
-        yield made
-        for vector in made:
-            vector.destroy()
+        with Owned() as own:
+            yield [own(self.vector(one)) for one in values]
 
     def gather_pairs(self, which: int, local: Array) -> Array | None:
         """Samples (.., n_pairs) of one contact in the order of B, on rank 0. Collective."""
