@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "error.h"
+#include "hb/at_parameter.h"
 #include "hb/diagnostics.h"
 #include "log.h"
 #include "solve/memory.h"
@@ -24,7 +25,6 @@ const Tuned memory_share("error_memory_share", 0.5, "share of the free memory th
 constexpr double vectors = 70;  // of a problem: its own, and for each GMRES iteration two
 const Tuned negligible("error_negligible", 1e-6,
                        "share of the residual, up to which a source is not solved for");
-const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed to the same parameter");
 const Tuned least("error_least", 17, "highest order that estimates take in at the least");
 const Tuned cheap("error_cheap", 1e4, "unknowns of these up to which it is so for three harmonics and less");
 const Tuned bent("error_bent", 0.2,
@@ -162,7 +162,7 @@ double DiscretisationError::to_moved() const { return finer_->stiffness_scale() 
 double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
   VecHandle weights = finer_->unknowns(), there = moved_->equations();
   finer_->metric(point, weights);
-  const double t = std::min(1.0, reach / solve::weighted_norm(weights, step));
+  const double t = std::min(1.0, farthest() / solve::weighted_norm(weights, step));
   moved_->residual(solve::moved(point, t, step), there);
   const double along = (solve::dot(there, r) / to_moved() + solve::dot(reduction, r)) / solve::dot(r, r);
   return (along - (1 - t)) / (t * t);
@@ -208,49 +208,6 @@ void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const>
 }
 
 namespace {
-
-/// Sum of squares of all but the parameter, the last of `count`.
-double size_beside(std::vector<double> v, int count) {
-  v[count - 1] = 0;
-  return std::inner_product(v.begin(), v.end(), v.begin(), 0.0);
-}
-
-/// Whether the branch leads straight to where `off` of the parameter is made up for; it turns back at folds,
-/// as one of curvature 1 does in the second of these.
-bool straight(double off, double t) {
-  return std::abs(off) <= reach * std::abs(t) && std::abs(off) <= t * t / 2;
-}
-
-/// Ways s along a branch of these slope and curvature at which off + slope s + curvature s^2 / 2 vanishes.
-/// Beside a fold, where the sign of the slope is rounding's, both of its sides; where nothing vanishes, as
-/// far to both of them as it would from the fold.
-std::vector<double> ways(double off, double slope, double curvature) {
-  const double root = slope * slope - 2 * curvature * off, far = std::sqrt(2 * std::abs(off / curvature));
-  const bool leads_there = root >= 0 && slope * slope > 2 * std::abs(curvature * off);
-  std::vector<double> found = {far, -far};
-  if (leads_there) found = {-2 * off / (slope + std::copysign(std::sqrt(root), slope))};
-  for (double& s : found) s = std::clamp<double>(s, -reach, reach);
-  return found;
-}
-
-/// Scalars of dy' + s t without a change of the last of `count`, the parameter; of several such the one that
-/// is off the most.
-std::vector<double> at_parameter(std::vector<double> const& change, std::vector<double> const& tangent,
-                                 std::function<double()> const& curvature, int count) {
-  const double off = change[count - 1], slope = tangent[count - 1];
-  std::vector<double> most;
-  std::vector<double> all = {off == 0 ? 0 : -off / slope};
-  if (!straight(off, slope)) {
-    const double bend = curvature();
-    all = bend == 0 || !std::isfinite(bend) ? std::vector<double>{reach, -reach} : ways(off, slope, bend);
-  }
-  for (double s : all) {
-    std::vector<double> there = change;
-    for (size_t j = 0; j < there.size(); ++j) there[j] += s * tangent[j];
-    if (most.empty() || size_beside(there, count) > size_beside(most, count)) most = std::move(there);
-  }
-  return most;
-}
 
 /// Of a step: where 1 - s + c s^2 first vanishes, or else is the least.
 double step_length(double c) { return c > 0.25 ? 1 / (2 * c) : 2 / (1 + std::sqrt(1 - 4 * c)); }

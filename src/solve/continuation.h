@@ -188,7 +188,7 @@ class Continuation {
   void emit_end(Trial const& end, double target, double length, std::string const& event);
   void polish(Trial&, double target);
   std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);
-  std::optional<Trial> reach_by_steps(double target, Place a, Place b, Hermite const&);
+  std::optional<Trial> reach_by_steps(double target, Place a, Place b, Hermite const&, std::string& why);
   std::optional<Trial> at_value(double target, Place a, Place b, Hermite const&, double length,
                                 std::string& why);
   static constexpr double off_the_curve = 0.5;  ///< of a step: a solution farther from it is another branch

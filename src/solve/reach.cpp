@@ -32,7 +32,7 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
   std::string why;
   auto trial = at_value(target, a, b, curve, length, why);
   if (!trial) trial = reach_along(target, a, b, curve);
-  if (!trial) trial = reach_by_steps(target, a, b, curve);
+  if (!trial) trial = reach_by_steps(target, a, b, curve, why);
   if (!trial) {
     if (event == "report") miss("report at " + problem_.parameter_text(value), why);
     return;
@@ -62,12 +62,11 @@ std::optional<Continuation::Trial> Continuation::at_value(double target, Place a
 /// nearer end it is gone half the way to the value, or half of that, until Newton finds the branch there, and
 /// on from the cubic through that point.
 std::optional<Continuation::Trial> Continuation::reach_by_steps(double target, Place a, Place b,
-                                                                Hermite const& curve) {
+                                                                Hermite const& curve, std::string& why) {
   std::vector<Trial> found;  // what the curve goes through
   found.reserve(tries);
   Hermite known = curve, through = curve;
   double share = 0.5;
-  std::string why;
   for (int k = 0; k < tries; ++k) {
     const auto on_curve = [&](double at) { return through.value(at); };
     const double goal = passing(on_curve, target, a, b.at);

@@ -128,19 +128,17 @@ class Solver(ABC, Generic[Begun]):
 
         Estimates of errors are, where harmonics and samples follow from them.
         """
-        from ..solve.continuation import Continuation
         from ..solve.point import points_of
-        from ..solve.refining import RefiningContinuation
+        from ..solve.refining import keeping
 
         low, high = self._ends()
         rows, newton, spent = [], 0, np.zeros(2)
         began = _clocks()
         settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(self.analysis.step)}
         settings["report_at"] = [float(a) for a in self.places]
-        kind = Continuation if accuracy is None else RefiningContinuation
-        settings.update({} if accuracy is None else {"accuracy": accuracy})
+        kind, asked = keeping(accuracy)
         with Owned() as own:
-            branch = kind(problem, own(problem.initial(low)), **settings)
+            branch = kind(problem, own(problem.initial(low)), **settings, **asked)
         for point in points_of(branch):
             spent += _clocks() - began
             newton += point.newton

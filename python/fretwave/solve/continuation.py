@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from typing import Any
 
@@ -67,6 +67,11 @@ class Continuation:
     way : of which only the end counts, to be corrected anew: none of the problem's own events (peaks, zero damping) are
         located, but folds are; no report or stop is made better than any point; and a start that Newton does not find
         is not looked for on ways of its own, as it is otherwise (`started` tells)
+
+    Attributes
+    ----------
+    tell : callable
+        Told in words of each change of the set of harmonics, where an accuracy is kept.
     """
 
     @of_their_kinds
@@ -103,11 +108,22 @@ class Continuation:
         self.way, self.started, self._first_reason = way, "", ""
         self._last: PETSc.Vec | None = None
         self._over, self._y0 = False, y0.copy()
+        self.tell: Callable[[str], None] = lambda text: None
 
     def __repr__(self) -> str:
         if self._core is None:
             return "Continuation(destroyed)"
         return f"Continuation({self._low:g} to {self._high:g}: {self.reason or 'under way'}, of {self.problem})"
+
+    @property
+    def accuracy_text(self) -> str:
+        """Where an accuracy was kept, and what limited it elsewhere; empty where none is asked for."""
+        return ""
+
+    @property
+    def largest(self) -> HarmonicProblem:
+        """That with the most harmonics, of those of its points."""
+        return self.problem
 
     def last_entry(self, y: PETSc.Vec) -> float:
         """The parameter's entry of unknowns or a tangent, on every rank. Collective."""

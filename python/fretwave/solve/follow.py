@@ -17,9 +17,9 @@ from ..hb.observer import Observer
 from ..kinds import of_their_kinds
 from ..mpi.same import expect_same
 from .branch import Branch
-from .continuation import Continuation, reports_of
+from .continuation import reports_of
 from .point import Point, points_of
-from .refining import RefiningContinuation
+from .refining import keeping
 from .steps import StepControl
 from .table import Table
 from .trace import Knot, Trace, cubic_of
@@ -113,10 +113,8 @@ def follow(
     reports = reports_of(report_at)
     expect_same(problem.model.comm, "accuracy, errors and unknowns of a branch", [accuracy or 0.0, errors, unknowns])
     settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": reports, "upwards": upwards}
-    if accuracy is None:
-        continuation = Continuation(problem, y0, **settings)
-    else:
-        continuation = RefiningContinuation(problem, y0, **settings, accuracy=accuracy)
+    kind, asked = keeping(accuracy)
+    continuation = kind(problem, y0, **settings, **asked)
     kept = Unknowns(problem, unknowns)
     trace = Trace(problem, kept)
     observer = Observer(problem, observe or {})
@@ -132,7 +130,7 @@ def follow(
             tell(rows[-1])
     missed = [*continuation.missed, *_outside(reports, low, high, [row[problem.meaning.parameter] for row in rows])]
     ended = continuation.converged, continuation.reason, missed, continuation.started
-    trace.close(continuation.largest if isinstance(continuation, RefiningContinuation) else problem)
+    trace.close(continuation.largest)
     continuation.destroy()
     if not own:
         y0.destroy()

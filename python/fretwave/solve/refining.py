@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -38,7 +38,7 @@ class RefiningContinuation(Continuation):
 
     A point whose estimated error exceeds the accuracy is solved again on a larger set before it is handed out, three
     times at most, and the branch goes on from there; where the estimate has room, smaller sets are taken. `problem` is
-    that of the present point; `largest` that with the most harmonics.
+    that of the present point.
 
     Parameters
     ----------
@@ -46,11 +46,6 @@ class RefiningContinuation(Continuation):
         Relative, of zeta and omega of a mode, of the complex amplitude of a response.
     least : Harmonics, optional
         The smallest set that is taken; by default the problem's.
-
-    Attributes
-    ----------
-    tell : callable
-        Told in words of each change of the set.
     """
 
     def __init__(
@@ -66,9 +61,8 @@ class RefiningContinuation(Continuation):
         least: Harmonics | None = None,
     ) -> None:
         super().__init__(problem, y0, stop, steps, report_at, upwards)
-        self.accuracy, self.least, self.largest = accuracy, least or problem.harmonics, problem
+        self.accuracy, self.least, self._largest = accuracy, least or problem.harmonics, problem
         self._settings = (steps or StepControl()).core(), list(report_at)
-        self.tell: Callable[[str], None] = lambda text: None
         self._aim = Aim(most_harmonics=most_harmonics(problem.model.n_dof))
         self._present: Point | None = None  # the last point handed out, and what it solves
         self._of = problem
@@ -149,7 +143,7 @@ class RefiningContinuation(Continuation):
         self.problem.forget_errors()
         self.problem, self._core = problem, core
         if problem.harmonics.block_size >= self.largest.harmonics.block_size:
-            self.largest = problem
+            self._largest = problem
         self.tell(f"{_place(problem, point)}: harmonics up to {harmonics.orders[-1]}, {harmonics.samples} samples")
         return Point(**{**found, "index": point.index, "step": point.step})
 
@@ -172,8 +166,11 @@ class RefiningContinuation(Continuation):
         return {**now, **{name: now[name] + n for name, n in self._helped_before.items() if name != "said"}}
 
     @property
+    def largest(self) -> HarmonicProblem:
+        return self._largest
+
+    @property
     def accuracy_text(self) -> str:
-        """Where the accuracy was kept, and what limited it elsewhere."""
         missed = sum(self.missed_by.values())
         text = f"accuracy {self.accuracy:g} kept at {self.points - missed} of {self.points} points"
         most = self._aim.most_harmonics
@@ -221,6 +218,11 @@ class RefiningContinuation(Continuation):
         """Free the solver, and what estimates errors. Collective."""
         self.problem.forget_errors()
         super().destroy()
+
+
+def keeping(accuracy: float | None) -> tuple[type[Continuation], dict[str, Any]]:
+    """The continuation that keeps an accuracy, or none, and what it is made with for that."""
+    return (Continuation, {}) if accuracy is None else (RefiningContinuation, {"accuracy": accuracy})
 
 
 def _place(problem: HarmonicProblem, point: Point) -> str:

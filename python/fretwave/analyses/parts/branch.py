@@ -181,20 +181,18 @@ def continuation(
     name : of the branch, in the log, where an analysis has several
     guess : of its first point, if it is not the problem's own; freed
     """
-    from ...solve.continuation import Continuation
-    from ...solve.refining import RefiningContinuation
+    from ...solve.refining import keeping
 
     analysis, name = context.analysis, name or context.name
     settings: dict[str, Any] = {"stop": ends, "steps": step_control(analysis.step), "report_at": list(report_at)}
-    kind = Continuation if analysis.accuracy is None else RefiningContinuation
+    kind, asked = keeping(analysis.accuracy)
     if go_on:
         branch = kind.restore(problem, None if snapshot is None else dict(snapshot), **settings)
     else:
-        settings.update({} if analysis.accuracy is None else {"accuracy": analysis.accuracy})
         with Owned() as own:
-            branch = kind(problem, own(problem.initial(ends[0]) if guess is None else guess), **settings)
-    if isinstance(branch, RefiningContinuation):
-        branch.tell = lambda text: context.console.detail(f"{name}: {text}")
+            y0 = own(problem.initial(ends[0]) if guess is None else guess)
+            branch = kind(problem, y0, **settings, **asked)
+    branch.tell = lambda text: context.console.detail(f"{name}: {text}")
     return branch
 
 
@@ -230,8 +228,6 @@ def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: 
 
     Kept in run.json too, under `branches`.
     """
-    from ...solve.refining import RefiningContinuation
-
     name = name or context.name
     lines, took = [f"started: {branch.started}"] if branch.started else [], ""
     if branch.repeated is not None:
@@ -240,7 +236,7 @@ def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: 
             f"resumed at {last.parameter:.6g}; its last point is solved again to a residual of {last.residual:.1e}"
         )
     lines += [f"missed: {text}" for text in branch.missed]
-    if isinstance(branch, RefiningContinuation):
+    if branch.accuracy_text:
         lines.append(branch.accuracy_text)
     if not context.analysis.errors:
         lines.append("errors are not estimated (errors = false)")
