@@ -36,7 +36,7 @@ Message message_of(std::exception_ptr const& failure) {
     std::rethrow_exception(failure);
   } catch (InputError const& e) {
     out.kind = Kind::input;
-    for (auto const& text : {std::string(e.what()), e.measured, e.expected, e.fix}) out.add(text);
+    for (auto const& text : {std::string(e.what()), e.measured, e.expected, e.fix, e.where}) out.add(text);
   } catch (SingularBlock const& e) {
     out.kind = Kind::singular, out.add(e.what());
   } catch (PetscFailure const& e) {
@@ -55,8 +55,9 @@ Message message_of(std::exception_ptr const& failure) {
   const std::string where = "rank " + std::to_string(rank) + ", " + task;
   switch (message.kind) {
     case Kind::input: {
-      const auto what = message.take(), measured = message.take(), expected = message.take();
-      throw InputError(what, measured, expected, message.take());
+      const auto what = message.take(), measured = message.take(), expected = message.take(),
+                 fix = message.take();
+      throw InputError(what, measured, expected, fix, message.take());
     }
     case Kind::singular:
       throw SingularBlock(message.take());

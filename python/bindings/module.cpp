@@ -33,7 +33,7 @@ void translate(std::exception_ptr const& pointer, void*) {
     std::rethrow_exception(pointer);
   } catch (InputError const& e) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("InputError");
-    raise("InputError", type(e.what(), nb::none(), text(e.measured), text(e.expected), text(e.fix)));
+    raise("InputError", type(e.what(), text(e.where), text(e.measured), text(e.expected), text(e.fix)));
   } catch (RankFailure const& e) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
     raise("FretwaveError", type(e.what(), text(e.where), nb::none(), nb::none(), text(e.fix)));
@@ -107,6 +107,8 @@ NB_MODULE(_core, m) {
   precondition::register_kinds();
   fault::arm_from(std::getenv("FRETWAVE_FAULT"), comm_rank(PETSC_COMM_WORLD));
   nb::register_exception_translator(translate);
+  // a script's model holds its law in Python, whose functions hold the script: at its end none is freed
+  nb::set_leak_warnings(false);
   m.doc() = "C++ core of fretwave; use the package's own classes";
   m.def("arm_fault", fault::arm,
         "Lets this process fail at the count-th pass of a named place (src/fault.h).");

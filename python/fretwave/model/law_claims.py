@@ -23,13 +23,6 @@ SAME, ROUNDING, OF_TANGENTS = 1e-6, 1e-12, 1e-4
 MEMORY = "a law with a memory is a compiled one (src/CONTRIBUTING.md); else return what u and v of a sample alone give"
 
 
-class LawError(InputError):
-    """Of a law in Python: one line as a text, for of an exception of a law ranks tell each other the last."""
-
-    def __str__(self) -> str:
-        return "; ".join(" ".join(line.split()) for line in self.body().splitlines())
-
-
 def check_words(law: PythonLaw) -> None:
     """Its attributes are what the core can take.
 
@@ -52,7 +45,7 @@ def check_words(law: PythonLaw) -> None:
     for name, (good, expected, fix) in wanted.items():
         if not good:
             measured = shortened(repr(getattr(law, name)))
-            raise LawError(f"`{name}` of a law in Python is wrong", place_of(law), measured, expected, fix)
+            raise InputError(f"`{name}` of a law in Python is wrong", place_of(law), measured, expected, fix)
 
 
 def taken(
@@ -70,15 +63,15 @@ def taken(
             found = found.astype(float)
     if found.dtype.kind not in "biufc" or masked(found):
         kind, fix = "masked values" if masked(found) else found.dtype.name, "return an array of numbers"
-        raise LawError(f"a law in Python returned {what} that is no number", where, kind, "real numbers", fix)
+        raise InputError(f"a law in Python returned {what} that is no number", where, kind, "real numbers", fix)
     flat = found.shape == (math.prod(shape),)
     if not flat and np.squeeze(np.empty(found.shape, "b")).shape != np.squeeze(np.empty(shape, "b")).shape:
         fix = f"return {what} with these axes, the last of them the pairs"
-        raise LawError(f"a law in Python returned {what} of another shape", where, found.shape, shape, fix)
+        raise InputError(f"a law in Python returned {what} of another shape", where, found.shape, shape, fix)
     if np.iscomplexobj(found):  # NumPy would keep the real part
         if abs(np.imag(found)).max(initial=0.0) > rounding * abs(np.real(found)).max(initial=0.0):
             fix = "return real forces; damping is a force of v"
-            raise LawError("a law in Python returned complex values", where, "complex", "real arrays", fix)
+            raise InputError("a law in Python returned complex values", where, "complex", "real arrays", fix)
         found = np.real(found)
     return np.ascontiguousarray(found, dtype=float).reshape(shape)
 
@@ -98,10 +91,10 @@ def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
     at, pairs = slice(sample, sample + 1), moving[sample]
     if not _same(_alone(law, u[at], v[at]), f[at], f):
         what = "the force of a law in Python depends on more than the present displacement and velocity"
-        raise LawError(what, place_of(law), "a sample by itself has another force", "the same force", MEMORY)
+        raise InputError(what, place_of(law), "a sample by itself has another force", "the same force", MEMORY)
     if law.odd and not _same(-_alone(law, -u[at], -v[at])[..., pairs], f[at][..., pairs], f):
         what, fix = "a law in Python says `odd = True`, and is not", "leave `odd` out, or say False"
-        raise LawError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
+        raise InputError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
 
 
 def _alone(law: PythonLaw, u: Array, v: Array) -> Array:

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
+from ..errors import InputError
 from ..given import whole
-from .law_claims import OF_TANGENTS, LawError, check_motion, check_words, place_of, taken
+from .law_claims import OF_TANGENTS, check_motion, check_words, place_of, taken
 from .law_info import OPEN, SLIP, LawInfo, Limit, ParameterInfo
 
 
@@ -127,7 +128,7 @@ class PythonLaw:
             by_u, by_v = given
         except (TypeError, ValueError):
             what, fix = "a law in Python returned no two tangents", "return both, or leave `tangent` out"
-            raise LawError(what, place_of(self), type(given).__name__, "(df/du, df/dv)", fix) from None
+            raise InputError(what, place_of(self), type(given).__name__, "(df/du, df/dv)", fix) from None
         shape = (len(u), self.components, self.components, u.shape[2])
         return taken(self, "a tangent", by_u, shape, OF_TANGENTS), taken(self, "a tangent", by_v, shape, OF_TANGENTS)
 
