@@ -173,15 +173,7 @@ def static_preload(
             first.destroy()
             branch.destroy()
             problem, branch, first = begin(times)
-        last, reason = None, ""
-        for point in chain([] if first is None else [first], branch):
-            if last is not None:
-                last.destroy()
-            last = point
-            if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
-                led = _led_by(_of_dofs(model, point.tangent), names)
-                reason = f"the structure moves without load{led}: nothing holds it in some direction"
-                break
+        last, reason = _end_of(first, branch, names)
         y = None if last is None else own(last).y
         if branch.converged and y is not None:
             free = _free_motion(problem, y)
@@ -202,6 +194,19 @@ def static_preload(
             "1",
             "hold the structure where contact alone cannot (an axial stop), or lower the load",
         )
+
+
+def _end_of(first: Point | None, branch: Continuation, names: Sequence[str] | None) -> tuple[Point | None, str]:
+    """The last point of a way to the full load, and why it ends there if nothing holds the structure. Collective."""
+    last = None
+    for point in chain([] if first is None else [first], branch):
+        if last is not None:
+            last.destroy()
+        last = point
+        if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
+            led = _led_by(_of_dofs(branch.problem.model, point.tangent), names)
+            return last, f"the structure moves without load{led}: nothing holds it in some direction"
+    return last, ""
 
 
 def _moved_by(problem: StaticPreload, history: list[list[float]], start: PETSc.Vec, control: StepControl) -> PETSc.Vec:
