@@ -66,6 +66,19 @@ def test_normals_of_a_table(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
     assert main([*command, "--pairs", table(tmp_path, "1,0.8,0", ends[:6], ends[6:])]) == 0
 
 
+def test_single_normals_of_a_table(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """One of six has the other sign: told, with its pair; without it nothing is."""
+    two = Two()
+    command, ends = two.write(tmp_path), two.ends.tolist()
+    rows = Path(table(tmp_path, "1,0.8,0", ends[:6], ends[6:]))
+    assert main([*command, "--pairs", str(rows)]) == 0 and "first body" not in capfd.readouterr().out
+    lines = rows.read_text().splitlines()
+    lines[2] = lines[2].replace("1,0.8,0", "-1,0,0")
+    rows.write_text("\n".join(lines) + "\n")
+    assert main([*command, "--pairs", str(rows)]) == 0
+    assert f"1 of 6 normals point into the first body, the first is pair 3 (node {ends[2]})" in capfd.readouterr().out
+
+
 @pytest.mark.parametrize("deck", [True, False], ids=["elements", "nodes"])
 def test_sides_far_apart(deck: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """The second bar 1e5 tolerances away. Pairs of a table as well, unless that is told to be meant."""

@@ -117,7 +117,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, Nodes
         found.notes.append(said_of(wheel, model))
     model.pairs = dict(_pairs(options, labels, nodes, wheel, found.notes))
     found.warnings += [] if nodes is None else nodes.constraints.doubts
-    check_directions(model)
+    found.warnings += check_directions(model)
     found.warnings += check_unjoined(model, where)
     if wheel is not None and nodes is not None:
         found.warnings += check_untied(model, wheel, nodes, options.tolerance)

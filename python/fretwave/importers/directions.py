@@ -15,14 +15,16 @@ from ..model.structure import Structure
 
 #: Mean cosine of normal and way out of the body below which the normal points into it: a right one has 0.5 and more.
 INTO = -0.2
+#: Cosine of a single pair below which its sign is in doubt: at a corner, or on a thin plate, it is 0 and more.
+SINGLE = -0.5
 #: Below which, and across which to the nodes' own plane, it lies along the face.
 ALONG, ACROSS = 0.3, 0.5
 #: Thickness of a plane set of nodes, and width of what is no line, over its length.
 THIN, WIDE = 1e-3, 1e-3
 
 
-def check_directions(model: Structure) -> None:
-    """The normals of all contacts point out of their first bodies.
+def check_directions(model: Structure) -> list[str]:
+    """The normals of all contacts point out of their first bodies; a warning where those of single pairs do not.
 
     Raises
     ------
@@ -30,27 +32,37 @@ def check_directions(model: Structure) -> None:
         They point into it, or lie along a plane face.
     """
     if model.labels is None or model.coordinates is None or model.node_numbers is None:
-        return
-    for name, pairs in model.pairs.items():
-        if pairs.nodes is not None and pairs.frames is not None:
-            _check(name, pairs, model, model.labels)
+        return []
+    known = {name: pairs for name, pairs in model.pairs.items() if pairs.nodes is not None and pairs.frames is not None}
+    return [said for name, pairs in known.items() if (said := _check(name, pairs, model, model.labels))]
 
 
-def _check(name: str, pairs: Pairs, model: Structure, labels: IntArray) -> None:
+def _check(name: str, pairs: Pairs, model: Structure, labels: IntArray) -> str:
     numbers, normals = np.asarray(pairs.nodes)[:, 0], np.asarray(pairs.frames)[:, 0]
     outwards = _ways_out(model, labels, numbers)
     known = np.isfinite(outwards).all(axis=1)
     if not known.any():
-        return
-    cosine = float(np.einsum("nx,nx->n", normals[known], outwards[known]).mean())
+        return ""
+    cosines = np.einsum("nx,nx->n", normals, outwards)
+    cosine = float(cosines[known].mean())
     angle = f"{np.degrees(np.arccos(np.clip(cosine, -1, 1))):.3g} degrees from the way out of the body, in the mean"
     if cosine < INTO:
         what, fix = "points into the first body", "turn it round, or give the two sets in the other order"
     elif cosine < ALONG and _along(normals, np.asarray(pairs.points)):
         what, fix = "lies along the face", "give the direction across the face"
     else:
-        return
+        return _single(name, numbers, cosines)
     raise InputError(f"the normal {what}", f"contact '{name}'", angle, "less than 90 degrees", fix)
+
+
+def _single(name: str, numbers: IntArray, cosines: Array) -> str:
+    """Of a table's pairs some may have another sign than the rest; NaN is not known."""
+    into = np.flatnonzero(cosines < SINGLE)
+    if not len(into):
+        return ""
+    pair, angle = int(into[0]), np.degrees(np.arccos(max(cosines[into[0]], -1.0)))
+    which = f"the first is pair {pair + 1} (node {numbers[pair]}), {angle:.3g} degrees from the way out of it"
+    return f"contact '{name}': {len(into)} of {len(numbers)} normals point into the first body, {which}: a wrong sign?"
 
 
 def _ways_out(model: Structure, labels: IntArray, numbers: IntArray) -> Array:
