@@ -338,3 +338,17 @@ def test_options_of_the_time_integration_are_read_after_the_points(tmp_path: Pat
     assert "forced: PETSc options that no solver has read: -time_ts_event_tol\n" in capsys.readouterr().out
     assert main([*words, "--force", "--set", "forced.petsc=-time_ts_rtol 1e-6 -time_ts_rtoll 3"]) == 2
     assert "fix:      did you mean `-time_ts_rtol`?" in capsys.readouterr().err
+
+
+#: Whose last option takes several values, and with them the file or folder.
+SWALLOWED = {
+    "import": (["--pairs", "a", "b", "out.h5"], "`fretwave import OUT.h5 ...`: before the options"),
+    "probe": (["--dof", "tip", "--at", "peak", "run"], "`fretwave probe RUNDIR ...`: before the options"),
+}
+
+
+@pytest.mark.parametrize("name", SWALLOWED)
+def test_a_place_behind_several_values(name, capfd):
+    given, said = SWALLOWED[name]
+    assert main([name, *given]) == 2
+    assert said in capfd.readouterr().err

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 
+#: What `argparse` says of places that stay empty.
+REQUIRED = "the following arguments are required: "
+
+
 class Parser(argparse.ArgumentParser):
     """Errors in the form of all others; under mpirun only the first rank prints."""
 
@@ -27,9 +31,10 @@ class Parser(argparse.ArgumentParser):
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        raise InputError(
-            f"the command line is wrong: {message}", where=self.prog, fix=f"`{self.prog} --help` lists what there is"
-        )
+        fix, (_, required, missing) = f"`{self.prog} --help` lists what there is", message.partition(REQUIRED)
+        if required:
+            fix = f"`{self.prog} {missing} ...`: before the options, one of several values takes what stands behind"
+        raise InputError(f"the command line is wrong: {message}", where=self.prog, fix=fix)
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         if launched_rank() == 0:
