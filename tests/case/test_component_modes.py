@@ -112,6 +112,22 @@ def test_it_is_kept_with_contact_that_slides_too(tmp_path: Path) -> None:
     assert "with sliding contact: " in (tmp_path / "run" / "run.log").read_text()
 
 
+@pytest.mark.parametrize("observed", ['"m9"', "{ mode = 4 }"], ids=["dof", "coordinate"])
+def test_a_mode_above_the_number_of_kept_dofs_is_one_of_the_component_modes_too(tmp_path: Path, observed: str) -> None:
+    """The fourth of a chain that keeps one or two of its dofs."""
+    n = 24
+    K = 100.0 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    text = f"[model]\ndofs = {[f'm{k}' for k in range(n)]}\nM = {np.eye(n).tolist()}\nK = {K.tolist()}\n"
+    slider = '[reduction]\n[[contact]]\nlaw = "jenkins"\npairs = ["m3"]\ntangential_stiffness = 50.0\n'
+    mode = f'[[analysis]]\nname = "a"\ntype = "mode"\nlinear_mode = 4\naccuracy = 1e-2\nnormalise = {observed}\n'
+    last = "friction_limit = 1e9\n" + mode + "amplitude = [0.01, 0.02]\n"
+    K[3, 3] += 50.0
+    (tmp_path / "case.toml").write_text(text.replace("'", '"') + slider + last)
+    assert call("run", str(tmp_path / "case.toml"), "--no-plots", "--out", str(tmp_path / "run")) == 0
+    found = [float(row["omega"]) for row in csv.DictReader((tmp_path / "run" / "a.csv").open())]
+    np.testing.assert_allclose(found, np.sqrt(scipy.linalg.eigh(K, eigvals_only=True)[3]), rtol=1e-6)
+
+
 def test_of_a_sector_it_is_kept_in_the_waves_of_the_analyses(tmp_path: Path) -> None:
     """Also where all inner dofs are needed: 20 of 23, one of each face and one of contact."""
     n, sectors, diameters, count = 23, 6, 2, 3

@@ -106,7 +106,7 @@ class HarmonicSection(AnalysisSection):
 
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
-        check_harmonics(report, self, facts.named)
+        check_harmonics(report, self, facts.dofs)
         if facts.model_known:
             check_wheel(report, self, facts)
         if facts.model_known and not self.follows_waves():

@@ -110,8 +110,8 @@ def check_observed(
 def _check_mode(report: Reporter, key: str, observed: ObservedTable, analysis: HarmonicSection, facts: Facts) -> None:
     if observed.dofs is not None or observed.weights is not None:
         report.wrong((key,), "names a mode and dofs", "one of them", f"write `{key} = {{ mode = {observed.mode} }}`")
-    elif facts.named is not None and observed.mode is not None and observed.mode > len(facts.named):
-        expected = f"1 to {len(facts.named)}, the number of dofs"
+    elif facts.dofs is not None and observed.mode is not None and observed.mode > len(facts.dofs):
+        expected = f"1 to {len(facts.dofs)}, the number of dofs"
         report.wrong((key, "mode"), "does not exist", expected, f"write `{key} = {{ mode = 1 }}`")
     sectors, diameters = facts.sectors, analysis.nodal_diameter
     if sectors and (analysis.follows_waves() or (diameters is not None and 2 * diameters % sectors)):
