@@ -39,7 +39,7 @@ def write(tmp_path: Path):
 
 
 def report(modes: int, error: float, unreduced: int = 10_000, interface: int = 0) -> ReductionReport:
-    waves = [{"relative": [None, -error]}] if interface else []
+    waves = [{"full_hz": [0.0, 1.0], "relative": [None, -error]}] if interface else []
     relative = [0.0 if interface else error]
     comparison = [1.0], [1.0], relative
     return ReductionReport(unreduced, 100, modes, 1.0, *comparison, 0.0, 0.0, interface, waves, faces=2 * interface)
@@ -126,6 +126,41 @@ def test_a_mode_above_the_number_of_kept_dofs_is_one_of_the_component_modes_too(
     assert call("run", str(tmp_path / "case.toml"), "--no-plots", "--out", str(tmp_path / "run")) == 0
     found = [float(row["omega"]) for row in csv.DictReader((tmp_path / "run" / "a.csv").open())]
     np.testing.assert_allclose(found, np.sqrt(scipy.linalg.eigh(K, eigvals_only=True)[3]), rtol=1e-6)
+
+
+CHAIN_60 = 100.0 * (2 * np.eye(60) - np.eye(60, k=1) - np.eye(60, k=-1))
+
+
+def stuck_chain(folder: Path, analysis: str, reduction: str = "") -> Path:
+    """60 unit masses, a slider of 50 N/m that never slips at the 21st, and an analysis `a` of accuracy 1e-2."""
+    text = f"[model]\ndofs = {[f'm{k}' for k in range(60)]}\nM = {np.eye(60).tolist()}\nK = {CHAIN_60.tolist()}\n"
+    slider = '[[contact]]\nlaw = "jenkins"\npairs = ["m20"]\ntangential_stiffness = 50.0\nfriction_limit = 1e9\n'
+    damped = f"mass_damping = 0.1\n[reduction]\n{reduction}\n"
+    keys = f'[[analysis]]\nname = "a"\naccuracy = 1e-2\n{analysis}\n'
+    (folder / "case.toml").write_text(text.replace("'", '"') + damped + slider + keys)
+    return folder / "case.toml"
+
+
+def test_a_response_asks_for_the_frequencies_of_its_range(tmp_path: Path) -> None:
+    """From the 24th mode on, far above the first one and those that are compared unless more count."""
+    forced = 'type = "forced"\nforce = { m0 = 1.0 }\nlevels = [1.0]\nfrequency = [1.8, 2.0]\nobserve = "m0"'
+    assert call("run", stuck_chain(tmp_path, forced), "--no-plots", "--out", tmp_path / "run") == 0
+    K = CHAIN_60 + 50.0 * np.diag(np.arange(60) == 20)
+    for row in csv.DictReader((tmp_path / "run" / "a.csv").open()):
+        omega = float(row["omega"])
+        exact = np.linalg.solve(K + (0.1j * omega - omega**2) * np.eye(60), np.eye(60)[0])[0]
+        found = float(row["amplitude"]) * np.exp(1j * float(row["phase"]))
+        assert abs(found - exact) < 1e-2 * abs(exact)
+
+
+@pytest.mark.parametrize("compare", [0, 1])
+def test_the_frequency_of_the_mode_counts_whatever_is_compared_else(tmp_path: Path, compare: int) -> None:
+    mode = 'type = "mode"\nnormalise = "m0"\namplitude = [0.01, 0.02]\nlinear_mode = 16'
+    case = stuck_chain(tmp_path, mode, f"compare = {compare}")
+    assert call("run", case, "--no-plots", "--out", tmp_path / "run") == 0
+    exact = np.sqrt(np.linalg.eigvalsh(CHAIN_60 + 50.0 * np.diag(np.arange(60) == 20))[15])
+    found = [float(row["omega0"]) for row in csv.DictReader((tmp_path / "run" / "a.csv").open())]
+    np.testing.assert_allclose(found, exact, rtol=1e-2 * ZETA_FLOOR)
 
 
 def test_of_a_sector_it_is_kept_in_the_waves_of_the_analyses(tmp_path: Path) -> None:

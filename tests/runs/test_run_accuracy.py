@@ -14,6 +14,7 @@ from tolerances import REPEATED, SOLVED
 import fretwave as fw
 from fretwave.errors import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
 from fretwave.results import results
+from fretwave.run import stopped
 from fretwave.solve import accuracy as rules
 
 pytestmark = pytest.mark.ranks(1)
@@ -97,8 +98,17 @@ def test_an_accuracy_that_is_not_kept_is_no_success(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(rules, "MOST_HARMONICS", 7)
     only = ["--quick", "--no-plots", "--only", "mode", "--set", "mode.accuracy=1e-3"]
     assert call("run", CASE, *only, "--out", tmp_path / "out") == EXIT_NOT_CONVERGED
-    assert "limited by harmonics" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "limited by harmonics" in said and "a milder --set mode.accuracy" in said and "shorter steps" not in said
     assert float(rows(tmp_path / "out", "mode")[-1]["amplitude"]) == pytest.approx(3.0)
+
+
+def test_what_limits_it_most_is_what_to_change():
+    kept = "level 2: stop value reached; accuracy 0.01 kept at 3 of 40 points, 7 limited by harmonics (255 at most)"
+    assert stopped.advice("a", kept) == "a milder --set a.accuracy=..."
+    kept += ", 30 limited by the reduction (more component modes: [reduction] modes)"
+    assert stopped.advice("a", kept).startswith("more component modes")
+    assert stopped.advice("a", f"{kept[9:]}, 31 limited by the solver").startswith("a tighter tolerance")
 
 
 @pytest.mark.parametrize(

@@ -104,6 +104,9 @@ class ForcedAnalysis(HarmonicSection):
     def kept_dofs(self) -> list[str]:
         return [*super().kept_dofs(), *dofs_of(self.observe), *self.force]
 
+    def up_to_hz(self) -> float:
+        return self.frequency[1]
+
     def observed(self) -> tuple[str, Observed]:
         return "observe", self.observe
 

@@ -96,6 +96,10 @@ class HarmonicSection(AnalysisSection):
     def harmonic(self) -> Optional[HarmonicSection]:
         return self
 
+    def up_to_hz(self) -> float:
+        """The highest frequency [Hz] that it is told to reach; 0 where none is."""
+        return 0.0
+
     def observed(self) -> Optional[tuple[str, Observed]]:
         """Its key that says what its amplitude is of, and what that is; None where it has no such key."""
         return None

@@ -85,15 +85,19 @@ def _reduced(
 ) -> tuple[Case | None, int | None]:
     """With this many component modes; or, where they are not enough, none and how many to take. Collective."""
     began = time.perf_counter()
+    assert case.reduction is not None
     with ExitStack() as stack:
         reduction = reduction_of(case, comm, modes)
         stack.enter_context(reduction)
         full = case.structure
         small = full.reduced(reduction) if full.cut is None else full.cut.reduced(reduction).tied()
         reduced = replace(case, structure=small, contacts=on(case.contacts, small))
-        wall, full_hz = time.perf_counter() - began, {} if choice is None else choice.full_hz
-        report = report_of(case, reduced, reduction, wall, comm, full_hz, names)
+        wall = time.perf_counter() - began
+        known = (case, reduced, reduction, wall, comm, {} if choice is None else choice.full_hz, names)
+        report = report_of(*known, case.reduction.compare if choice is None else choice.compare)
         if choice is not None:
+            while choice.looks_further(report):
+                report = report_of(*known, choice.compare)
             more = choice.next(report)
             if more is not None:
                 return None, more

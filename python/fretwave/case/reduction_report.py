@@ -84,10 +84,10 @@ class ReductionReport:
         """Dofs that component modes move: no more of these than that."""
         return self.unreduced - self.kept - self.faces
 
-    def every_relative(self) -> list[list[float | None]]:
-        """Of all frequencies that are compared, limit by limit, wave by wave and speed by speed."""
+    def every_comparison(self) -> list[tuple[list[float], list[float | None]]]:
+        """Full frequencies [Hz] and their relative errors, limit by limit, wave by wave and speed by speed."""
         further = [*([self.sliding] if self.sliding else []), *self.waves, *self.speeds]
-        return [list(self.relative), *(found["relative"] for found in further)]
+        return [(self.full_hz, self.relative), *((found["full_hz"], found["relative"]) for found in further)]
 
     def plain(self) -> dict[str, Any]:
         """For run.json and results.h5."""
@@ -128,6 +128,7 @@ def report_of(
     comm: MPI.Comm,
     full_hz: FullHz,
     names: Sequence[str],
+    compare: int,
 ) -> ReductionReport:
     """What was reduced, with the lowest frequencies before and after. Collective.
 
@@ -135,6 +136,7 @@ def report_of(
     ----------
     full_hz : those before as far as they are known; others are added
     names : analyses at whose speeds they are compared
+    compare : how many
     """
     began = time.perf_counter()
     common: dict[str, Any] = {
@@ -143,16 +145,15 @@ def report_of(
         "wall_s": round(wall, 3),
     }
     if case.structure.cut is not None:
-        found = _of_sector(case, cast("SectorReduction", reduction))
+        found = _of_sector(case, cast("SectorReduction", reduction), compare)
     else:
-        found = _of_structure(case, reduced, comm, full_hz)
-    found["speeds"] = _at_speeds(case, reduced, comm, full_hz, names)
+        found = _of_structure(case, reduced, comm, full_hz, compare)
+    found["speeds"] = _at_speeds(case, reduced, comm, full_hz, names, compare)
     return ReductionReport(**common, **found, compare_wall_s=round(time.perf_counter() - began, 3))
 
 
-def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz) -> dict[str, Any]:
-    assert case.reduction is not None
-    count = min(case.reduction.compare, reduced.structure.n_dof)
+def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz, compare: int) -> dict[str, Any]:
+    count = min(compare, reduced.structure.n_dof)
     limits = _limits(case.contacts) if count else []
     found = [_comparison((SPIN, case.speed_rpm, 0, limit), case, reduced, count, comm, full_hz) for limit in limits]
     sliding = {"sliding": found[1]} if len(found) > 1 else {}
@@ -194,14 +195,12 @@ def _known_hz(known: FullHz, key: tuple[str, float, int, str], case: Case, count
 
 
 def _at_speeds(
-    case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz, names: Sequence[str]
+    case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz, names: Sequence[str], compare: int
 ) -> list[dict[str, Any]]:
     """The comparison where another share of the stiffness acts than that which was reduced. Collective."""
-    section = case.reduction
-    assert section is not None
     asked = [case.analyses[name].spins() for name in names]
     ends = dict.fromkeys((part, speed) for part, speeds in asked for speed in (*speeds[:1], *speeds[-1:]))
-    count = min(section.compare, reduced.structure.n_dof)
+    count = min(compare, reduced.structure.n_dof)
     sector, found = case.structure.cut is not None, []
     for part, speed in ends if count else ():
         if speed == case.turns_at(part):
@@ -235,10 +234,10 @@ def _lowest_hz(case: Case, count: int, comm: MPI.Comm, limit: str, nodal_diamete
         return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]
 
 
-def _of_sector(case: Case, reduction: SectorReduction) -> dict[str, Any]:
-    section, cut = case.reduction, case.structure.cut
-    assert section is not None and cut is not None and cut.low is not None and cut.high is not None
-    errors = reduction.error(_compared(case), section.compare) if section.compare else []
+def _of_sector(case: Case, reduction: SectorReduction, compare: int) -> dict[str, Any]:
+    cut = case.structure.cut
+    assert cut is not None and cut.low is not None and cut.high is not None
+    errors = reduction.error(_compared(case), compare) if compare else []
     waves = [_wave(error) for error in errors]
     return {
         "unreduced": cut.n_dof,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from ..analyses.parts.context import Outcome
@@ -9,6 +10,8 @@ from ..errors import NotConverged
 from ..hb.suspects import FREE, HIDES, LEADS_OVER
 from ..mpi.petsc_share import prefix_of
 
+#: Of a branch that has come to its end.
+REACHED = "stop value reached"
 #: A loop may end within itself, and an internal resonance lead to another mode.
 OVER = "steps that pass over loops (--petsc '-fw_branch_other 1e300')"
 
@@ -34,6 +37,8 @@ def without(name: str, needed: str) -> Outcome:
 
 def advice(name: str, reason: str) -> str:
     """What most often helps against a reason to stop."""
+    if f"{REACHED}; accuracy" in reason:
+        return _of_accuracy(name, reason)
     if "number of points" in reason:
         return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
     if "does not fit" in reason:
@@ -67,6 +72,17 @@ def advice(name: str, reason: str) -> str:
         f"{_other_end(name, reason)}shorter steps (--set {name}.step.minimum=1e-11), or {OVER};"
         " --petsc -snes_monitor shows Newton's steps"
     )
+
+
+def _of_accuracy(name: str, reason: str) -> str:
+    """Of a branch that is whole, but not as accurate as it was to be: against what limits it most often."""
+    share = {int(found[1]): found[2] for found in re.finditer(r"(\d+) limited by (?:the )?(\w+)", reason)}
+    helps = {
+        "reduction": "more component modes ([reduction] modes, in place of those chosen)",
+        "solver": "a tighter tolerance (--petsc '-snes_rtol 1e-12')",
+    }
+    milder = f"a milder --set {name}.accuracy=..."
+    return f"{helps[source]}, or {milder}" if (source := share[max(share)]) in helps else milder
 
 
 def _other_end(name: str, reason: str) -> str:
