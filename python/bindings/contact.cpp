@@ -57,8 +57,8 @@ class PythonLaw : public contact::Law {
     const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components),
                                        size_t(motion.pairs)};
     nb::tuple states = passing_errors([&] {
-      return nb::cast<nb::tuple>(law_.attr("_states")(
-          numpy_copy(motion.u, shape), numpy_copy(motion.v, shape), numpy_copy(f, shape)));
+      return nb::cast<nb::tuple>(law_.attr("_states")(numpy_copy(motion.u, shape),
+                                                      numpy_copy(motion.v, shape), numpy_copy(f, shape)));
     });
     std::vector<double> status(out.status.size()), gap(out.status.size());
     take(states[0], status.size(), status.data());

@@ -14,8 +14,8 @@ from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave import _core
-from fretwave.solve import starting
-from fretwave.solve.starting import STALLED, Way, mode_start, starts
+from fretwave.solve.afar import STALLED, last_of
+from fretwave.solve.starting import Way, mode_start, starts
 
 # Den Hartog's oscillator with a limit of 0.3: most frequencies start in a motion that Newton does not find from zero.
 SLIDERS = [("jenkins", 1e2), ("jenkins", 1e3), ("jenkins", 1e4), ("regularised_coulomb", 1e-3)]
@@ -127,6 +127,29 @@ class Tangle:
 @pytest.mark.ranks(1)
 def test_a_way_that_comes_no_nearer_to_its_end_is_given_up():
     """Regularised friction of many samples: a way ran about at 5 % of its range for its 20,000 points."""
-    last, count, reason = starting._last(Tangle(), goal=1.0)
+    last, count, reason = last_of(Tangle(), goal=1.0)
     assert last is not None and STALLED < count < 1000
     assert reason == f"it comes no nearer in {STALLED} points"
+
+
+@pytest.mark.parametrize("stop_stiffness", [0.0, 0.2], ids=["linear", "cubic"])
+def test_a_light_damper_is_no_support(comm, stop_stiffness):
+    """Regularised friction halfway up a chain: stuck modes are none of it, at any amplitude; no first point was found.
+
+    At small ones friction is viscous, R / eps: there the mode is the lowest damped one.
+    """
+    n, at, limit, eps = 40, 20, 0.8, 0.1
+    random = np.random.default_rng(2)
+    k, masses = 1600 * random.uniform(0.8, 1.2, n), random.uniform(0.8, 1.2, n)
+    M, K = np.diag(masses), np.diag(k + np.r_[k[1:], 0]) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
+    damper = friction(np.eye(n)[at : at + 1], limit, eps)
+    tip = fw.Contact("cubic_spring", np.eye(n)[-1:], {"cubic_stiffness": stop_stiffness}, "tip")
+    model = fw.Model(M, K, 2e-4 * K, [damper, tip], comm)
+    mode = fw.NonlinearMode(model, fw.choose_harmonics(model, 5, 128), dof=n - 1, start=fw.linear_modes(model, 1)[0])
+    branch = fw.follow(mode, 0.3, (1e-3, 0.5), errors=False)
+    C = 2e-4 * K + np.diag(limit / eps * (np.arange(n) == at))
+    roots = np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, k=n), -np.linalg.solve(M, np.hstack([K, C]))]))
+    lowest = min(roots[roots.imag > 0], key=abs)
+    assert branch.converged and "without contact" in branch.started
+    assert branch["omega"][-1] == pytest.approx(lowest.imag, rel=1e-4)
+    assert branch["beta"][-1] == pytest.approx(-lowest.real, rel=1e-3)

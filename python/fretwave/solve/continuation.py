@@ -19,8 +19,9 @@ from ..mpi.log import event
 from ..mpi.same import expect_same
 from ..mpi.spread import Cuttable, Spread, fill
 from ..texts import shortened
+from .afar import far_from_start
 from .point import Point
-from .starting import far_from_start, given, starts
+from .starting import given, starts
 from .steps import StepControl
 
 #: Relative change of sampled forces' harmonics on doubled samples above which a failure is put down to sampling.

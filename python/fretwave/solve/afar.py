@@ -1,0 +1,193 @@
+"""A mode's first point by way of other amplitudes, where the mode is next to a linear one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..arrays import Array
+from ..errors import FretwaveError
+from ..hb.harmonic_problem import HarmonicProblem
+from ..hb.nonlinear_mode import NonlinearMode
+from ..model.modes import LinearMode, linear_modes
+from ..mpi.destroyable import Owned
+from .steps import StepControl
+
+if TYPE_CHECKING:
+    from .continuation import Continuation
+
+#: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried; and above it.
+AFAR = 5
+#: Points of a way at the most: it turns a corner wherever a pair opens or closes.
+WAY_POINTS = 20000
+#: Points of a way that come no nearer to its end, after which it is given up: a tangle where samples change states.
+STALLED = 300
+#: Steps of a mode that grows, at first in proportion: where such long ones lose their way, those of any branch.
+GROWTH = (
+    StepControl(initial=1.5, maximum=3.0, max_error=1e-2, max_points=WAY_POINTS),
+    StepControl(max_points=WAY_POINTS),
+)
+#: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
+FAR = 0.02
+#: Lowest modes without contact among which the likest one is looked for.
+FREE_MODES = 6
+#: Share of its length in which a mode moves what is normalised, at the least.
+RESTS = 1e-6
+
+
+#: Follows a branch, as `Continuation` does.
+Follow = Callable[..., Any]
+
+
+def far_from_start(problem: HarmonicProblem, y: PETSc.Vec, linear: LinearMode | None = None) -> bool:
+    """Whether a first point of a mode stands so far from the linear one that it may be of another. Collective.
+
+    Parameters
+    ----------
+    linear : by default that of the problem
+    """
+    if not isinstance(problem, NonlinearMode):
+        return False
+    return bool(abs(problem.state(y)["omega0"] / (linear or problem.start).omega - 1.0) > FAR)
+
+
+def grown(
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str], far: bool
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The mode grows from an amplitude at which the linear one solves it."""
+    yield from _from_afar(follow, problem, y0, reasons, far, 0.01)
+
+
+def shrunk(
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str]
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The mode comes down from an amplitude beside which friction, a bounded force, is small.
+
+    Regularised friction is viscous at small amplitudes, and may leave none of them that oscillates. At large ones it
+    is the linear mode without contact, far from the stuck one where much hangs on that.
+    """
+    yield from _from_afar(follow, problem, y0, reasons, False, 100.0)
+    if (free := _free_mode(problem)) is not None:
+        yield from _beside(follow, problem, y0, free)
+        yield from _from_afar(follow, problem, y0, reasons, False, 100.0, free)
+
+
+def _beside(
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, linear: LinearMode
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The mode at the amplitude of y0, if it is near to this linear one there."""
+    amplitude = problem.parameter(y0)
+    with Owned() as own:
+        guess = own(_guess(problem, amplitude, linear))
+        branch = own(follow(problem, guess, (0.5 * amplitude, 2 * amplitude), upwards=True, way=True))
+        if (point := next(branch, None)) is None:
+            return
+        point = own(point)
+        if far_from_start(problem, point.y, linear):
+            return
+        y = point.y.copy()
+    yield f"from the linear mode without contact ({linear.frequency_hz:.6g} Hz)", y
+
+
+def _free_mode(problem: NonlinearMode) -> LinearMode | None:
+    """Of the lowest modes without contact the one whose shape is likest that of the start. Collective."""
+    start = _shape(problem.start)
+
+    def moves(mode: LinearMode) -> bool:
+        at_row = sum(weight * _shape(mode)[dof] for dof, weight in problem.row)
+        return mode.omega > 0 and abs(at_row) > RESTS * max(abs(weight) for _, weight in problem.row)
+
+    try:
+        modes = linear_modes(problem.model, min(FREE_MODES, problem.model.n_dof), "free")
+    except FretwaveError:  # on all ranks
+        return None
+    return max(filter(moves, modes), key=lambda mode: abs(np.vdot(_shape(mode), start)), default=None)
+
+
+def _shape(mode: LinearMode) -> Array:
+    """(n_dof,) complex, of length one."""
+    shape = mode.shape + 1j * mode.imaginary
+    return np.asarray(shape / np.linalg.norm(shape))
+
+
+def _guess(problem: NonlinearMode, amplitude: float, linear: LinearMode | None) -> PETSc.Vec:
+    """The problem's linear mode at an amplitude, or another one. Collective."""
+    if linear is None:
+        return problem.initial(amplitude)
+    method, prefix = problem.method, problem.prefix
+    with Owned() as own:
+        other = own(NonlinearMode(problem.model, problem.harmonics, method, problem.dof, linear, prefix))
+        y = other.initial(amplitude)
+    if problem.model.comm.rank == problem.model.comm.size - 1:  # the last entries: frequency, log of the amplitude
+        y.getArray()[-2] *= linear.omega / problem.start.omega
+    return y
+
+
+def _from_afar(
+    follow: Follow,
+    problem: NonlinearMode,
+    y0: PETSc.Vec,
+    reasons: list[str],
+    far: bool,
+    ratio: float,
+    linear: LinearMode | None = None,
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The mode followed to the amplitude of y0 from the nearest one, of those a ratio apart, that has a mode.
+
+    Parameters
+    ----------
+    linear : mode to start from, by default the problem's
+    """
+    of = "" if linear is None else f" of the linear one without contact ({linear.frequency_hz:.6g} Hz)"
+    amplitude, upwards = problem.parameter(y0), ratio < 1
+    for power in range(1, AFAR + 1):
+        begin = amplitude * ratio**power
+        span = (0.5 * begin, amplitude) if upwards else (amplitude, 2 * begin)
+        for control in GROWTH:
+            with Owned() as own:
+                guess = own(_guess(problem, begin, linear))
+                branch = own(follow(problem, guess, span, control, upwards=upwards, way=True))
+                last, count, reason = last_of(branch, amplitude, linear or problem.start)
+                converged = branch.converged
+            if converged and last is not None:
+                yield f"the mode was followed from amplitude {begin:.3g}{of} in {count} steps", last
+                return
+            end = ""
+            if last is not None:
+                end = f" to {problem.parameter(last):.3g}"
+                last.destroy()
+            if not count:
+                break
+        if count:
+            reasons.append(f"following the mode from amplitude {begin:.3g}{of}{end}: {reason}")
+            return
+    if not far:
+        which = "smaller" if upwards else "larger"
+        reasons.append(f"no mode was found at {AFAR} {which} amplitudes{of}, to {begin:.3g}")
+
+
+def last_of(branch: Continuation, goal: float, linear: LinearMode | None = None) -> tuple[PETSc.Vec | None, int, str]:
+    """Unknowns of the last point of a branch, the number of its points, and why it ended. Collective.
+
+    Parameters
+    ----------
+    goal : parameter that it is to reach
+    linear : nothing is followed from a first point far from this mode
+    """
+    last, count, nearest, since = None, 0, np.inf, 0
+    for point in branch:
+        if last is not None:
+            last.destroy()
+        point.tangent.destroy()
+        last, count = point.y, count + 1
+        if linear and count == 1 and far_from_start(branch.problem, last, linear):
+            last.destroy()
+            return None, 0, branch.reason
+        if (left := abs(point.parameter - goal)) < nearest:
+            nearest, since = left, count
+        if count - since >= STALLED:
+            return last, count, f"it comes no nearer in {STALLED} points"
+    return last, count, branch.reason
