@@ -1,6 +1,7 @@
 #include "together.h"
 
 #include <new>
+#include <utility>
 
 #include "error.h"
 
@@ -24,10 +25,14 @@ struct Message {
   }
 };
 
-/// Its last line: those before it are the traceback of an exception in Python.
-std::string last_line(std::string text) {
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  return text.substr(text.find_last_of('\n') + 1);
+/// What an exception says, and where: one of Python has a traceback before its words, of which the last line
+/// tells the place.
+std::pair<std::string, std::string> words_and_place(std::string const& text) {
+  constexpr char const* frame = "\n  File ";
+  const auto last = text.rfind(frame), end = text.find('\n', last + 1);
+  if (last == std::string::npos || end == std::string::npos) return {text, ""};
+  const auto place = last + std::char_traits<char>::length("\n  ");
+  return {text.substr(end + 1), text.substr(place, end - place)};
 }
 
 Message message_of(std::exception_ptr const& failure) {
@@ -44,9 +49,10 @@ Message message_of(std::exception_ptr const& failure) {
   } catch (std::bad_alloc const&) {
     out.kind = Kind::memory;
   } catch (std::exception const& e) {
-    out.add(last_line(e.what()));
+    auto const [words, place] = words_and_place(e.what());
+    out.add(words), out.add(place);
   } catch (...) {
-    out.add("an exception without words");
+    out.add("an exception without words"), out.add("");
   }
   return out;
 }
@@ -69,7 +75,9 @@ Message message_of(std::exception_ptr const& failure) {
     case Kind::other:
       break;
   }
-  throw RankFailure(message.take(), where, "mend the law if it is one of your own; report it otherwise");
+  const auto what = message.take(), place = message.take();
+  throw RankFailure(what, place.empty() ? where : where + ", " + place,
+                    "mend the law if it is one of your own; report it otherwise");
 }
 
 }  // namespace

@@ -105,6 +105,22 @@ def test_a_law_that_is_not_what_it_says_is_refused(law: type[Cubic]) -> None:
     assert error.value.where == f"law '{law.__name__}'" and str(error.value).endswith(error.value.fix)
 
 
+class Raising(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        if u.shape[2] == 3:  # on the first rank alone
+            raise ValueError("out of\nluck")
+        return super().force(u, v)
+
+
+@pytest.mark.ranks(2)
+def test_other_ranks_are_told_what_a_law_raises_and_where() -> None:
+    """The last line of its words was all that they were told."""
+    with pytest.raises(fw.FretwaveError) as error:
+        followed(Raising())
+    assert error.value.what == "ValueError: out of\nluck"
+    assert error.value.where is not None and f'rank 0, contact forces, File "{__file__}", line' in error.value.where
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [("normal", 5), ("odd", "no"), ("odd", 1), ("stuck_stiffness", np.nan), ("stuck_stiffness", None)],
