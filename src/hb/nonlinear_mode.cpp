@@ -11,6 +11,7 @@ namespace fretwave::hb {
 
 namespace {
 
+constexpr double growth = 3;          // of the logarithm of the amplitude in a step of Newton's, at the most
 constexpr double no_damping = 1e-10;  // a ratio that is rounding (as in post/mode_curve.py)
 
 /// phi^H M phi w^2 / phi^H phi, with multiply(x, M x).
@@ -141,6 +142,8 @@ double NonlinearMode::effect(Vec y, Vec dy) {
   const double omega = std::abs(z[1]), beta = std::max(std::abs(z[0]), 1e-4 * omega);
   return std::max(std::abs(dz[1]) / omega, 0.01 * std::abs(dz[0]) / beta);
 }
+
+double NonlinearMode::bearable(Vec, Vec dy) { return std::min(1.0, growth / std::abs(scalars(dy)[2])); }
 
 bool NonlinearMode::damped(Vec y) {
   constexpr double rounding = 1e-7;  // what a last step may leave in beta

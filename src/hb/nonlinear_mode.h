@@ -29,6 +29,8 @@ class NonlinearMode : public HarmonicProblem {
   bool scale(Vec y) override;
   /// Of omega, and a hundredth of the relative one of beta (of 1e-4 omega where it is smaller).
   double effect(Vec y, Vec dy) override;
+  /// The amplitude is an exponential of its entry.
+  double bearable(Vec y, Vec dy) override;
   bool damped(Vec y) override;
 
   double parameter_value(double entry) const override;

@@ -57,8 +57,20 @@ Newton::Newton(Problem& problem, std::string const& prefix, bool past_kinks)
   linear_ = std::make_unique<LinearSolver>(bordered_, prefix, snes_);
   check(SNESSetJacobian(snes_, linear_->jacobian(), linear_->jacobian(), form_jacobian, this));
   check(SNESSetSolution(snes_, y));
+  SNESLineSearch search;
+  check(SNESGetLineSearch(snes_, &search));
+  check(SNESLineSearchSetPreCheck(search, shorten, this));
   check(SNESSetFromOptions(snes_));
   linear_->take_options();
+}
+
+/// A step of a nearly singular Jacobian may lead where no line search comes back from.
+PetscErrorCode Newton::shorten(SNESLineSearch, Vec y, Vec step, PetscBool* changed, void* context) {
+  auto& newton = *static_cast<Newton*>(context);
+  return newton.linear_->guard().run([&] {
+    const double share = newton.bordered_.problem().bearable(y, step);
+    if (*changed = share < 1 ? PETSC_TRUE : PETSC_FALSE; share < 1) check(VecScale(step, share));
+  });
 }
 
 /// PETSc's test, but for a guess that passes it: a step's cost buys the digits that a small damping needs.

@@ -53,6 +53,7 @@ class Newton {
  private:
   static PetscErrorCode converged(SNES, PetscInt iteration, PetscReal unknowns, PetscReal step,
                                   PetscReal residual, SNESConvergedReason*, void*);
+  static PetscErrorCode shorten(SNESLineSearch, Vec y, Vec step, PetscBool* changed, void*);
   static PetscErrorCode form_function(SNES, Vec, Vec, void*);
   static PetscErrorCode form_jacobian(SNES, Vec, Mat, Mat, void*);
   Outcome solve_past_kinks(Vec y);

@@ -48,6 +48,8 @@ class Problem {
   virtual bool scale(Vec /*y*/) { return false; }
   /// Relative change of what is read from y by a small step dy; 0 if nothing is known. Collective.
   virtual double effect(Vec /*y*/, Vec /*dy*/) { return 0; }
+  /// Share of a step from y that its equations can bear: beyond it numbers overflow. Collective.
+  virtual double bearable(Vec /*y*/, Vec /*dy*/) { return 1; }
   /// Above it no residual is accepted, nor any where rounding alone may leave as much: where stiff pairs
   /// change between stick and slip within a sample, a tiny step tells nothing of the forces that are left.
   virtual double largest_residual() const { return std::numeric_limits<double>::infinity(); }

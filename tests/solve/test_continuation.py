@@ -195,7 +195,7 @@ def test_largest_number_of_points_ends_the_branch(two_dof, comm):
 
 def test_failure_at_the_start_is_reported(two_dof, comm):
     """Non-convergence is a return value (STYLE): no point, a reason, no exception."""
-    with options(fails_snes_max_it=1):
+    with options(fails_snes_max_it=0):
         branch, points = follow(problem_of(two_dof, comm, prefix="fails_"), start=0.2)
     assert points == [] and not branch.converged
     assert branch.reason.startswith("no solution at the start: ") and "MAX_IT" in branch.reason
