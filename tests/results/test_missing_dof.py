@@ -56,7 +56,7 @@ def held_node() -> int:
     ("dof", "fix"),
     [
         ("n24z", "n24z is called `tip`"),
-        ("n1234z", "the mesh has no node 1234"),
+        ("n1234z", "name a node of the mesh: it has no node 1234"),
         (f"n{held_node()}z", f"node {held_node()} is held: it is not in the matrices"),
         ("n24rx", "node 24 is held along rx (not in the matrices), and free along x, y, z"),
         ("tipp", "did you mean `tip`?"),

@@ -50,7 +50,7 @@ def _of_node(structure: Structure, name: str) -> str | None:
         return None
     node, free = int(found[1]), [DIRECTIONS[k - 1] for n, k in structure.labels if n == int(found[1]) and k <= 6]
     if node not in structure.node_numbers:
-        return f"the mesh has no node {node}"
+        return f"name a node of the mesh: it has no node {node}"
     if free:
         return f"node {node} is held along {found[2]} (not in the matrices), and free along {', '.join(free)}"
     return f"node {node} is held: it is not in the matrices"
