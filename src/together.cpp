@@ -16,7 +16,10 @@ struct Message {
   Kind kind = Kind::other;
   std::string texts;
 
-  void add(std::string const& text) { texts += text + '\0'; }
+  void add(std::string text) {
+    std::erase(text, '\0');
+    texts += text + '\0';
+  }
   std::string take() {
     const auto end = texts.find('\0');
     std::string first = texts.substr(0, end);
@@ -25,14 +28,26 @@ struct Message {
   }
 };
 
+std::optional<InputError> (*input_error_of)(std::exception const&) = nullptr;
+
 /// What an exception says, and where: one of Python has a traceback before its words, of which the last line
 /// tells the place.
-std::pair<std::string, std::string> words_and_place(std::string const& text) {
-  constexpr char const* frame = "\n  File ";
-  const auto last = text.rfind(frame), end = text.find('\n', last + 1);
-  if (last == std::string::npos || end == std::string::npos) return {text, ""};
-  const auto place = last + std::char_traits<char>::length("\n  ");
-  return {text.substr(end + 1), text.substr(place, end - place)};
+std::pair<std::string, std::string> words_and_place(std::string text) {
+  const std::string head = "Traceback (most recent call last):\n", frame = "  File ";
+  if (!text.starts_with(head)) return {text, ""};
+  std::string place;
+  text.erase(0, head.size());
+  for (size_t end; text.starts_with(frame) && (end = text.find('\n')) != std::string::npos;) {
+    place = text.substr(2, end - 2);
+    text.erase(0, end + 1);
+  }
+  return {text, place};
+}
+
+Message message_of(InputError const& e) {
+  Message out{Kind::input, ""};
+  for (auto const& text : {std::string(e.what()), e.measured, e.expected, e.fix, e.where}) out.add(text);
+  return out;
 }
 
 Message message_of(std::exception_ptr const& failure) {
@@ -40,8 +55,7 @@ Message message_of(std::exception_ptr const& failure) {
   try {
     std::rethrow_exception(failure);
   } catch (InputError const& e) {
-    out.kind = Kind::input;
-    for (auto const& text : {std::string(e.what()), e.measured, e.expected, e.fix, e.where}) out.add(text);
+    return message_of(e);
   } catch (SingularBlock const& e) {
     out.kind = Kind::singular, out.add(e.what());
   } catch (PetscFailure const& e) {
@@ -49,6 +63,8 @@ Message message_of(std::exception_ptr const& failure) {
   } catch (std::bad_alloc const&) {
     out.kind = Kind::memory;
   } catch (std::exception const& e) {
+    if (input_error_of)
+      if (auto const input = input_error_of(e)) return message_of(*input);
     auto const [words, place] = words_and_place(e.what());
     out.add(words), out.add(place);
   } catch (...) {
@@ -81,6 +97,10 @@ Message message_of(std::exception_ptr const& failure) {
 }
 
 }  // namespace
+
+void read_input_errors_by(std::optional<InputError> (*reader)(std::exception const&)) {
+  input_error_of = reader;
+}
 
 void agree(MPI_Comm comm, char const* task, std::exception_ptr failure) {
   const int rank = comm_rank(comm), ranks = comm_size(comm);

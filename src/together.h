@@ -1,9 +1,14 @@
 #pragma once
 #include <exception>
+#include <optional>
 
+#include "error.h"
 #include "petsc.h"
 
 namespace fretwave {
+
+/// What finds the core's InputError in an exception of a language around it. For the whole process.
+void read_input_errors_by(std::optional<InputError> (*)(std::exception const&));
 
 /// Every rank throws what the first rank that failed has caught, in its words; returns if none has.
 /// Collective.

@@ -1,25 +1,9 @@
 #include "casters.h"
 #include "contact/registry.h"
-#include "error.h"
 
 namespace fretwave::python {
 
 namespace {
-
-/// What a call into Python returns; an InputError of it as the core's, which goes over to other ranks whole.
-template <class Call>
-auto passing_errors(Call call) {
-  try {
-    return call();
-  } catch (nb::python_error& error) {
-    if (!error.matches(nb::module_::import_("fretwave.errors").attr("InputError"))) throw;
-    const auto said = [&](char const* name) {
-      const nb::object value = error.value().attr(name);
-      return value.is_none() ? std::string() : std::string(nb::str(value).c_str());
-    };
-    throw InputError(said("what"), said("measured"), said("expected"), said("fix"), said("where"));
-  }
-}
 
 /// A law written in Python, for prototypes: calls object._evaluate(u, v) -> (f, df_du, df_dv) with arrays
 /// (samples, components, pairs).
@@ -41,10 +25,8 @@ class PythonLaw : public contact::Law {
   void force(contact::Motion const& motion, double* f, contact::Record& record) const override {
     const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components),
                                        size_t(motion.pairs)};
-    nb::tuple out = passing_errors([&] {
-      return nb::cast<nb::tuple>(
-          law_.attr("_evaluate")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape)));
-    });
+    nb::tuple out =
+        nb::cast<nb::tuple>(law_.attr("_evaluate")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape)));
     take(out[0], motion.size(), f);
     record.df_du.resize(motion.size() * motion.components);
     record.df_dv.resize(motion.size() * motion.components);
@@ -56,10 +38,8 @@ class PythonLaw : public contact::Law {
     contact::add_work(motion, f, out.work);
     const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components),
                                        size_t(motion.pairs)};
-    nb::tuple states = passing_errors([&] {
-      return nb::cast<nb::tuple>(law_.attr("_states")(numpy_copy(motion.u, shape),
-                                                      numpy_copy(motion.v, shape), numpy_copy(f, shape)));
-    });
+    nb::tuple states = nb::cast<nb::tuple>(
+        law_.attr("_states")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape), numpy_copy(f, shape)));
     std::vector<double> status(out.status.size()), gap(out.status.size());
     take(states[0], status.size(), status.data());
     take(states[1], gap.size(), gap.data());

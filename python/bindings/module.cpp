@@ -14,6 +14,7 @@
 #include "flat_product.h"
 #include "log.h"
 #include "precondition/kinds.h"
+#include "together.h"
 #include "tuned.h"
 #include "wheel/wheel_pc.h"
 
@@ -44,6 +45,17 @@ void translate(std::exception_ptr const& pointer, void*) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("PetscError");
     raise("PetscError", type(e.what()));
   }
+}
+
+/// An InputError of a law in Python as the core's, which goes over to other ranks whole.
+std::optional<InputError> input_error_of(std::exception const& error) {
+  auto const* python = dynamic_cast<nb::python_error const*>(&error);
+  if (!python || !python->matches(nb::module_::import_("fretwave.errors").attr("InputError"))) return {};
+  const auto said = [&](char const* name) {
+    const nb::object value = python->value().attr(name);
+    return value.is_none() ? std::string() : std::string(nb::str(value).c_str());
+  };
+  return InputError(said("what"), said("measured"), said("expected"), said("fix"), said("where"));
 }
 
 /// Options given but read by nothing: most often misspelt.
@@ -107,6 +119,7 @@ NB_MODULE(_core, m) {
   precondition::register_kinds();
   fault::arm_from(std::getenv("FRETWAVE_FAULT"), comm_rank(PETSC_COMM_WORLD));
   nb::register_exception_translator(translate);
+  read_input_errors_by(input_error_of);
   // a script's model holds its law in Python, whose functions hold the script: at its end none is freed
   nb::set_leak_warnings(false);
   m.doc() = "C++ core of fretwave; use the package's own classes";

@@ -105,10 +105,14 @@ def test_a_law_that_is_not_what_it_says_is_refused(law: type[Cubic]) -> None:
     assert error.value.where == f"law '{law.__name__}'" and str(error.value).endswith(error.value.fix)
 
 
+#: With another traceback in them.
+WORDS = 'out of\nluck:\n  File "other.py", line 7, in force\nof old'
+
+
 class Raising(Cubic):
     def force(self, u: Any, v: Any) -> Any:
         if u.shape[2] == 3:  # on the first rank alone
-            raise ValueError("out of\nluck")
+            raise ValueError(WORDS)
         return super().force(u, v)
 
 
@@ -117,7 +121,7 @@ def test_other_ranks_are_told_what_a_law_raises_and_where() -> None:
     """The last line of its words was all that they were told."""
     with pytest.raises(fw.FretwaveError) as error:
         followed(Raising())
-    assert error.value.what == "ValueError: out of\nluck"
+    assert error.value.what == f"ValueError: {WORDS}"
     assert error.value.where is not None and f'rank 0, contact forces, File "{__file__}", line' in error.value.where
 
 
