@@ -66,6 +66,7 @@ class ModeStart : public NonlinearMode {
   double parameter_entry(double value) const override { return value; }
   std::string parameter_text(double value) const override;
   std::string impossible(Vec y) override;
+  double bearable(Vec, Vec) override { return 1; }
   std::vector<solve::TestFunction> tests(Vec, Vec) override { return {}; }
   void metric(Vec y, Vec weights) override;
 

@@ -7,13 +7,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from models.core_models import friction, mode_problem, single_dof, whole
+import scipy.linalg
+from models.core_models import friction, mode_problem, options, single_dof, whole
 from models.followed import follow, response, stop
 from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave import _core
+from fretwave.solve import afar
 from fretwave.solve.afar import STALLED, last_of
 from fretwave.solve.starting import Way, mode_start, starts
 
@@ -153,3 +155,37 @@ def test_a_light_damper_is_no_support(comm, stop_stiffness):
     assert branch.converged and "without contact" in branch.started
     assert branch["omega"][-1] == pytest.approx(lowest.imag, rel=1e-4)
     assert branch["beta"][-1] == pytest.approx(-lowest.real, rel=1e-3)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("unit", [1.0, 1e-3], ids=["metres", "every-second-dof-in-mm"])
+@pytest.mark.parametrize(("number", "alike"), [(4, False), (7, True), (10, True)], ids=["4th", "7th", "10th"])
+def test_the_mode_without_contact_is_alike_or_none(comm, unit, number, alike):
+    """In inertia, whatever units dofs have: the tenth stuck mode of a chain was followed to the first free one."""
+    n, random = 24, np.random.default_rng(3)
+    k, masses = 1600 * random.uniform(0.3, 3, n), random.uniform(0.3, 3, n)
+    M, K = np.diag(masses), np.diag(k + np.r_[k[1:], 0]) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
+    T = np.diag(np.where(np.arange(n) % 2, 1.0, unit))
+    model = fw.Model(T @ M @ T, T @ K @ T, contacts=[friction(np.eye(n)[[5, 14]] @ T, 1.0, 1e-3)], comm=comm)
+    start = fw.linear_modes(model, number)[-1]
+    dof = int(np.argmax(np.abs(start.shape)))
+    free = afar._without_contact(fw.NonlinearMode(model, fw.Harmonics([1], 16), dof=dof, start=start))
+    squares, shapes = scipy.linalg.eigh(K, M)
+    shares = np.abs(shapes.T @ M @ T @ start.shape)
+    assert (free is not None) == alike == (shares.max() > 0.65)  # 0.60, 0.74, 0.99
+    if free is not None:
+        assert free.start.omega == pytest.approx(np.sqrt(squares[np.argmax(shares)]), rel=SOLVED)
+
+
+def test_a_wave_beside_which_another_is_avoided_does_not_start_without_contact(comm):
+    """The unknowns of its unfolding are not in a guess of one mode: PETSc ended the run."""
+    n, phases = 12, 2 * np.pi * 2 * np.arange(12) / 12
+    K = 90 * np.eye(n) - 20 * (np.eye(n, k=1) + np.eye(n, k=-1) + np.eye(n, k=n - 1) + np.eye(n, k=1 - n))
+    model = fw.Model(np.eye(n), K, 1e-4 * K, [friction(np.eye(n), 0.8, 0.1)], comm)
+    cosine, sine = np.cos(phases) / np.sqrt(n), np.sin(phases) / np.sqrt(n)
+    wave = fw.LinearMode(np.sqrt(90 - 40 * np.cos(2 * np.pi / 6)), 0.0, cosine, sine)
+    with options(wave_snes_max_it=0):
+        harmonics = fw.choose_harmonics(model, 3, 64)
+        mode = fw.NonlinearMode(model, harmonics, dof=0, start=wave, prefix="wave_", avoid=cosine - 1j * sine)
+        branch = fw.follow(mode, 0.3, (0.2, 0.5), errors=False)
+    assert not branch.converged and branch.reason.startswith("no solution at the start")

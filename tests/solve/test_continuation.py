@@ -194,7 +194,10 @@ def test_largest_number_of_points_ends_the_branch(two_dof, comm):
 
 
 def test_failure_at_the_start_is_reported(two_dof, comm):
-    """Non-convergence is a return value (STYLE): no point, a reason, no exception."""
+    """Non-convergence is a return value (STYLE): no point, a reason, no exception.
+
+    With one step of Newton's the mode without contact would do for a start.
+    """
     with options(fails_snes_max_it=0):
         branch, points = follow(problem_of(two_dof, comm, prefix="fails_"), start=0.2)
     assert points == [] and not branch.converged

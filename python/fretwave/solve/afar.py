@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from ..arrays import Array
-from ..errors import FretwaveError
+from ..errors import InputError
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.nonlinear_mode import NonlinearMode
+from ..model.model import Model
 from ..model.modes import LinearMode, linear_modes
 from ..mpi.destroyable import Owned
 from .steps import StepControl
@@ -33,9 +33,9 @@ GROWTH = (
 #: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
 FAR = 0.02
 #: Lowest modes without contact among which the likest one is looked for.
-FREE_MODES = 6
-#: Share of its length in which a mode moves what is normalised, at the least.
-RESTS = 1e-6
+FREE_MODES = 24
+#: Of its shape, in inertia: less is another mode's.
+ALIKE = 0.6
 
 
 #: Follows a branch, as `Continuation` does.
@@ -70,59 +70,58 @@ def shrunk(
     is the linear mode without contact, far from the stuck one where much hangs on that.
     """
     yield from _from_afar(follow, problem, y0, reasons, False, 100.0)
-    if (free := _free_mode(problem)) is not None:
+    if len(problem.unfolding(y0)) == 0 and (free := _without_contact(problem)) is not None:
         yield from _beside(follow, problem, y0, free)
         yield from _from_afar(follow, problem, y0, reasons, False, 100.0, free)
 
 
 def _beside(
-    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, linear: LinearMode
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, free: NonlinearMode
 ) -> Iterator[tuple[str, PETSc.Vec]]:
-    """The mode at the amplitude of y0, if it is near to this linear one there."""
+    """The mode at the amplitude of y0, if it is near to the linear one without contact there."""
     amplitude = problem.parameter(y0)
     with Owned() as own:
-        guess = own(_guess(problem, amplitude, linear))
+        guess = own(_guess(problem, amplitude, free))
         branch = own(follow(problem, guess, (0.5 * amplitude, 2 * amplitude), upwards=True, way=True))
         if (point := next(branch, None)) is None:
             return
         point = own(point)
-        if far_from_start(problem, point.y, linear):
+        if far_from_start(problem, point.y, free.start):
             return
         y = point.y.copy()
-    yield f"from the linear mode without contact ({linear.frequency_hz:.6g} Hz)", y
+    yield f"from the linear mode without contact ({free.start.frequency_hz:.6g} Hz)", y
 
 
-def _free_mode(problem: NonlinearMode) -> LinearMode | None:
-    """Of the lowest modes without contact the one whose shape is likest that of the start. Collective."""
-    start = _shape(problem.start)
-
-    def moves(mode: LinearMode) -> bool:
-        at_row = sum(weight * _shape(mode)[dof] for dof, weight in problem.row)
-        return mode.omega > 0 and abs(at_row) > RESTS * max(abs(weight) for _, weight in problem.row)
-
+def _without_contact(problem: NonlinearMode) -> NonlinearMode | None:
+    """The problem from that of its lowest modes without contact that is alike to its own; None without. Collective."""
+    model = problem.model
     try:
-        modes = linear_modes(problem.model, min(FREE_MODES, problem.model.n_dof), "free")
-    except FretwaveError:  # on all ranks
+        modes = linear_modes(model, min(FREE_MODES, model.n_dof), "free")
+        likeness = _alike(model, problem.start, modes)
+        alike, mode = max(zip(likeness, modes), key=lambda pair: pair[0])
+        if alike < ALIKE:
+            return None
+        return NonlinearMode(model, problem.harmonics, problem.method, problem.dof, mode, problem.prefix)
+    except InputError:  # on all ranks: there are none, or it does not move what is normalised
         return None
-    return max(filter(moves, modes), key=lambda mode: abs(np.vdot(_shape(mode), start)), default=None)
 
 
-def _shape(mode: LinearMode) -> Array:
-    """(n_dof,) complex, of length one."""
-    shape = mode.shape + 1j * mode.imaginary
-    return np.asarray(shape / np.linalg.norm(shape))
+def _alike(model: Model, one: LinearMode, others: Sequence[LinearMode]) -> list[float]:
+    """|phi^H M psi| of modes of unit modal mass: 1 for the same shape, 0 for another mode's. Collective."""
+    inertia = model.inertia(one.shape) + 1j * model.inertia(one.imaginary)
+    mass = abs(np.vdot(one.shape + 1j * one.imaginary, inertia))
+    return [abs(np.vdot(psi.shape + 1j * psi.imaginary, inertia)) / np.sqrt(mass) for psi in others]
 
 
-def _guess(problem: NonlinearMode, amplitude: float, linear: LinearMode | None) -> PETSc.Vec:
-    """The problem's linear mode at an amplitude, or another one. Collective."""
-    if linear is None:
+def _guess(problem: NonlinearMode, amplitude: float, free: NonlinearMode | None) -> PETSc.Vec:
+    """The problem's linear mode at an amplitude, or that without contact. Collective."""
+    if free is None:
         return problem.initial(amplitude)
-    method, prefix = problem.method, problem.prefix
-    with Owned() as own:
-        other = own(NonlinearMode(problem.model, problem.harmonics, method, problem.dof, linear, prefix))
-        y = other.initial(amplitude)
-    if problem.model.comm.rank == problem.model.comm.size - 1:  # the last entries: frequency, log of the amplitude
-        y.getArray()[-2] *= linear.omega / problem.start.omega
+    y = free.initial(amplitude)
+    first, end = y.getOwnershipRange()
+    if end == y.getSize():  # beta, omega over that of the linear mode, and the amplitude are the last entries
+        y.setValue(end - 2, free.start.omega / problem.start.omega)
+    y.assemble()
     return y
 
 
@@ -133,24 +132,24 @@ def _from_afar(
     reasons: list[str],
     far: bool,
     ratio: float,
-    linear: LinearMode | None = None,
+    free: NonlinearMode | None = None,
 ) -> Iterator[tuple[str, PETSc.Vec]]:
     """The mode followed to the amplitude of y0 from the nearest one, of those a ratio apart, that has a mode.
 
     Parameters
     ----------
-    linear : mode to start from, by default the problem's
+    free : whose linear mode it starts from, by default the problem's
     """
-    of = "" if linear is None else f" of the linear one without contact ({linear.frequency_hz:.6g} Hz)"
+    of = "" if free is None else f" of the linear one without contact ({free.start.frequency_hz:.6g} Hz)"
     amplitude, upwards = problem.parameter(y0), ratio < 1
     for power in range(1, AFAR + 1):
         begin = amplitude * ratio**power
         span = (0.5 * begin, amplitude) if upwards else (amplitude, 2 * begin)
         for control in GROWTH:
             with Owned() as own:
-                guess = own(_guess(problem, begin, linear))
+                guess = own(_guess(problem, begin, free))
                 branch = own(follow(problem, guess, span, control, upwards=upwards, way=True))
-                last, count, reason = last_of(branch, amplitude, linear or problem.start)
+                last, count, reason = last_of(branch, amplitude, (free or problem).start)
                 converged = branch.converged
             if converged and last is not None:
                 yield f"the mode was followed from amplitude {begin:.3g}{of} in {count} steps", last

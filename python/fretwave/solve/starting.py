@@ -47,7 +47,8 @@ def starts(
 
     A forced response is led there by its excitation, raised from zero at the first frequency; a mode is followed from
     a smaller amplitude, where its contacts stick. Either is led there by gaps that close from where nothing touches,
-    a mode with regularised friction from a larger amplitude, beside which that is small.
+    a mode with regularised friction from a larger amplitude, beside which that is small, or from the linear mode
+    without contact.
 
     Parameters
     ----------
