@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,13 @@ def test_numbers_double_until_the_accuracy_is_kept(interface: int) -> None:
     assert choice.next(report(40, 9e-5, interface=interface)) is None
     assert "10 leave 1.0e-02, 20 leave 1.0e-03, 40 leave 9.0e-05" in choice.line()
     assert "not kept" not in choice.line()
+
+
+def test_frequencies_beyond_those_that_are_compared_are_not_taken_for_good() -> None:
+    """80 below 1 Hz, of a response up to 3 Hz: the number was enough at 80, with an error of 1e-15 of others."""
+    choice = Choice(1e-6, 1, up_to_hz=3.0, compare=80)
+    found = replace(report(80, 0.0), full_hz=[1.0] * 80, reduced_hz=[1.0] * 80, relative=[0.0] * 80)
+    assert not choice.looks_further(found) and choice.next(found) == 160 and "80 do not tell of all" in choice.line()
 
 
 def test_modes_that_change_little_or_are_all_there_are_end_it() -> None:

@@ -352,3 +352,5 @@ def test_a_place_behind_several_values(name, capfd):
     given, said = SWALLOWED[name]
     assert main([name, *given]) == 2
     assert said in capfd.readouterr().err
+    assert main([name]) == 2
+    assert f"`fretwave {name} --help` lists" in capfd.readouterr().err

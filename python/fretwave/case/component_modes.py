@@ -74,8 +74,9 @@ class Choice:
         return len(found.relative) >= self.frequencies and least >= self.up_to_hz
 
     def _error(self, found: ReductionReport) -> float:
-        """The largest of those that count; infinite where the reduced model has not so many."""
-        if len(found.relative) < self.compare and found.component_modes < found.inner and not self._all_seen(found):
+        """The largest of those that count; infinite where not all of them are compared."""
+        fewer = len(found.relative) < self.compare or self.compare >= MOST_COMPARED
+        if fewer and found.component_modes < found.inner and not self._all_seen(found):
             return math.inf
         every = [(k, f, e) for hz, relative in found.every_comparison() for k, (f, e) in enumerate(zip(hz, relative))]
         counted = [e for k, f, e in every if k < self.frequencies or f <= self.up_to_hz]
@@ -96,7 +97,9 @@ class Choice:
 
     def line(self) -> str:
         """In words, for the log."""
-        tried = ((number, f"leave {error:.1e}" if error < math.inf else "have not all") for number, error in self.tried)
+        tried = (
+            (number, f"leave {error:.1e}" if error < math.inf else "do not tell of all") for number, error in self.tried
+        )
         numbers = ", ".join(f"{number} {found}" for number, found in tried)
         missed = f"; {self.end}: this is not kept" if self.end else ""
         return f"reduction: component modes for {self.asked:.1e} of the lowest frequencies: {numbers}{missed}"

@@ -25,6 +25,7 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def]
         """Of a sub-command too: what it does not know is told by itself."""
+        self._given = list(args or [])
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -32,9 +33,15 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         fix, (_, required, missing) = f"`{self.prog} --help` lists what there is", message.partition(REQUIRED)
-        if required:
-            fix = f"`{self.prog} {missing} ...`: before the options, one of several values takes what stands behind"
+        if required and self._takes_several():
+            places = missing.replace(",", "")
+            fix = f"`{self.prog} {places} ...`: before the options, one of several values takes what stands behind"
         raise InputError(f"the command line is wrong: {message}", where=self.prog, fix=fix)
+
+    def _takes_several(self) -> bool:
+        """Whether an option of several values is given."""
+        many = [action for action in self._actions if action.nargs in ("+", "*")]
+        return any(option in self._given for action in many for option in action.option_strings)
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         if launched_rank() == 0:

@@ -76,13 +76,14 @@ def advice(name: str, reason: str) -> str:
 
 def _of_accuracy(name: str, reason: str) -> str:
     """Of a branch that is whole, but not as accurate as it was to be: against what limits it most often."""
-    share = {int(found[1]): found[2] for found in re.finditer(r"(\d+) limited by (?:the )?(\w+)", reason)}
+    shares = [(int(found[1]), found[2]) for found in re.finditer(r"(\d+) limited by (?:the )?(\w+)", reason)]
+    source, milder = max(shares, default=(0, ""))[1], f"a milder --set {name}.accuracy=..."
     helps = {
-        "reduction": "more component modes ([reduction] modes, in place of those chosen)",
-        "solver": "a tighter tolerance (--petsc '-snes_rtol 1e-12')",
+        "reduction": f"more component modes ([reduction] modes, in place of those chosen), or {milder}",
+        "solver": f"a tighter tolerance (--petsc '-snes_rtol 1e-12'), or {milder}",
+        "errors": f"harmonics and samples of your own in place of {name}.accuracy",
     }
-    milder = f"a milder --set {name}.accuracy=..."
-    return f"{helps[source]}, or {milder}" if (source := share[max(share)]) in helps else milder
+    return helps.get(source, milder)
 
 
 def _other_end(name: str, reason: str) -> str:
