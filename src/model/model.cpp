@@ -16,10 +16,14 @@ void check_term(Term const& term, PetscInt local, PetscInt global) {
   PetscInt rows, cols, local_rows, local_cols;
   check(MatGetSize(term.A, &rows, &cols));
   check(MatGetLocalSize(term.A, &local_rows, &local_cols));
-  if (rows != global || cols != global || local_rows != local || local_cols != local)
-    throw InputError("a linear term does not have the size or the row layout of the first one",
+  const std::string letter(1, "KCM"[term.order]);
+  if (rows != global || cols != global)
+    throw InputError(letter + " does not have the size of the other matrices",
                      std::to_string(rows) + " x " + std::to_string(cols),
-                     std::to_string(global) + " x " + std::to_string(global),
+                     std::to_string(global) + " x " + std::to_string(global), "give matrices of the same dofs");
+  if (local_rows != local || local_cols != local)
+    throw InputError(letter + " lies on the ranks in other rows than the other matrices",
+                     std::to_string(local_rows) + " rows on this rank", std::to_string(local),
                      "build all matrices with the same row distribution");
 }
 

@@ -210,3 +210,9 @@ def test_a_wave_closes_around_the_wheel(wave: str) -> None:
             fw.Sector([[1.0]], terms, 6).model(diameters)  # type: ignore[arg-type]
     with pytest.raises(fw.InputError, match=r"acts on no sector[\s\S]*0\.5"):
         fw.Model([[1.0]], {0: [[3.0]], 0.5: [[-1.0]], -0.5: [[-1.0]]}, sectors=6)  # type: ignore[dict-item]
+
+
+def test_matrices_of_two_sizes_are_told_by_name() -> None:
+    with pytest.raises(fw.InputError, match="M does not have the size of the other matrices") as error:
+        fw.Model(np.eye(2), np.eye(3))
+    assert (error.value.measured, error.value.expected) == ("2 x 2", "3 x 3")

@@ -57,6 +57,8 @@ def taken(
     ------
     InputError
     """
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.shape == shape:  # in time, at each step
+        return np.ascontiguousarray(values)
     found, where = np.asanyarray(values), place_of(law)
     if found.dtype.kind == "O":
         with suppress(TypeError, ValueError):
