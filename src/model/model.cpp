@@ -20,7 +20,8 @@ void check_term(Term const& term, PetscInt local, PetscInt global) {
   if (rows != global || cols != global)
     throw InputError(letter + " does not have the size of the other matrices",
                      std::to_string(rows) + " x " + std::to_string(cols),
-                     std::to_string(global) + " x " + std::to_string(global), "give matrices of the same dofs");
+                     std::to_string(global) + " x " + std::to_string(global),
+                     "give matrices of the same dofs");
   if (local_rows != local || local_cols != local)
     throw InputError(letter + " lies on the ranks in other rows than the other matrices",
                      std::to_string(local_rows) + " rows on this rank", std::to_string(local),
