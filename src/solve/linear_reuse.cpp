@@ -22,12 +22,12 @@ const Tuned renewal("linear_renewal", 1.0 / 16,
 
 /// Far from a solution a step need not be better than its linearisation: Newton's quadratic convergence
 /// foretells that (|g_k| / |g_k-1|)^2 is left of the residual (Eisenstat & Walker, SIAM J. Sci. Comput. 17,
-/// 1996, choice 2). Where six digits may end the iteration, six it is: so it ends with as little left as
-/// ever. 768 pairs (34,725 unknowns) take half the iterations of GMRES and the same steps.
+/// 1996, choice 2). Where that, or six digits, may end the iteration, six it is: so it ends with as little
+/// left as ever. 768 pairs (34,725 unknowns) take half the iterations of GMRES and the same steps.
 void LinearSolver::aim(double residual, double before, double enough) {
   const double foretold = std::pow(residual / before, 2), least = digits,
                most = std::clamp(double(roughly), least, 0.5);
-  aimed_at_ = residual * digits <= enough ? least : std::clamp(foretold, least, most);
+  aimed_at_ = residual * std::max(digits, foretold) <= enough ? least : std::clamp(foretold, least, most);
   check(KSPSetTolerances(newton_ksp(), aimed_at_, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 

@@ -50,6 +50,8 @@ class LinearSolver {
   double rough() const { return rough_; }
   /// A large problem whose options leave open how far steps are solved.
   bool aims() const { return aims_; }
+  /// The last step was solved to few digits, for it was not foretold to end the iteration.
+  bool hurried() const { return aims_ && aimed_at_ > digits; }
   /// The digits of Newton's next step of such a one from this residual and the one before it; a residual of
   /// `enough` may end the iteration.
   void aim(double residual, double before, double enough);

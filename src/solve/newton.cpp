@@ -102,6 +102,7 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
       if (*reason == 0 && creeps) *reason = SNES_DIVERGED_MAX_IT;
     } else if (iteration < patience && newton.matters(y, residual, before))
       *reason = SNES_CONVERGED_ITERATING;
+    if (*reason > 0 && newton.linear_->hurried()) *reason = SNES_CONVERGED_ITERATING;
   });
 }
 

@@ -34,6 +34,8 @@ class Newton {
   std::string route() const { return linear_->route(); }
   /// An iteration costs more than what is done with a point.
   bool dear() const { return linear_->krylov(); }
+  /// A large problem, whose steps are solved no further than they are good for.
+  bool aims() const { return linear_->aims(); }
   Fallbacks const& fallbacks() const { return linear_->fallbacks(); }
   /// Measures the rows in the forces that act at y, as `solve` does first; whether they were in others.
   bool scale(Vec y);
