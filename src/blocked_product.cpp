@@ -15,11 +15,7 @@ constexpr int width = 4;
 constexpr int most = BlockedProduct::most / width;  // registers, of the machine's 16
 using Register = double __attribute__((vector_size(width * sizeof(double))));
 
-struct Rows {
-  PetscInt count;
-  PetscInt const *begin, *column;
-  double const* value;
-};
+using Rows = SparseRows;
 
 /// y += A x of some registers of each dof's coefficients, from x and y on. Behind the m of a dof, the next
 /// one's are summed too, and left out of y.
@@ -105,18 +101,27 @@ void BlockedProduct::with_rows(Part const& part, Visit visit) const {
   check(MatRestoreRowIJ(part.A, 0, PETSC_FALSE, PETSC_FALSE, &rows.count, &rows.begin, &rows.column, &done));
 }
 
-void BlockedProduct::multiply_add(Vec y) {
+/// visit(rows, coefficients) of both parts; others' coefficients come while this rank's are worked on.
+template <class Visit>
+void BlockedProduct::with_parts(Visit visit) {
   if (exchange_) check(VecScatterBegin(exchange_, mine_, ghosts_, INSERT_VALUES, SCATTER_FORWARD));
+  for (Part const& part : parts_) {
+    if (&part != parts_.data())
+      check(VecScatterEnd(exchange_, mine_, ghosts_, INSERT_VALUES, SCATTER_FORWARD));
+    with_rows(part, [&](Rows const& rows) { visit(rows, columns_.data() + size_t(part.first_column) * m_); });
+  }
+}
+
+void BlockedProduct::multiply_add(Vec y) {
   const WriteArray out(y);
-  const auto add = [&](Part const& part) {
-    with_rows(part, [&](Rows const& rows) {
-      multiply(rows, columns_.data() + size_t(part.first_column) * m_, out.data(), m_);
-    });
-  };
-  add(parts_[0]);
-  if (!exchange_) return;
-  check(VecScatterEnd(exchange_, mine_, ghosts_, INSERT_VALUES, SCATTER_FORWARD));
-  add(parts_[1]);
+  with_parts([&](Rows const& rows, double const* x) { multiply(rows, x, out.data(), m_); });
+}
+
+void BlockedProduct::multiply_exactly(Vec y, Vec low) {
+  const WriteArray out(y), below(low);
+  with_parts([&](Rows const& rows, double const* x) {
+    fretwave::multiply_exactly(rows, x, out.data(), below.data(), m_);
+  });
 }
 
 void BlockedProduct::transposed_multiply_add(Vec y) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "exact_rows.h"
 #include "petsc.h"
 
 namespace fretwave {
@@ -17,6 +18,8 @@ class BlockedProduct {
   double* columns() { return columns_.data(); }
   /// y += A x. Collective.
   void multiply_add(Vec y);
+  /// y + low += A x to twice the digits (`exact_rows.h`). Collective.
+  void multiply_exactly(Vec y, Vec low);
   /// y += A^T x. Collective.
   void transposed_multiply_add(Vec y);
 
@@ -28,6 +31,8 @@ class BlockedProduct {
   };
   template <class Visit>
   void with_rows(Part const&, Visit visit) const;
+  template <class Visit>
+  void with_parts(Visit visit);
 
   int m_;
   PetscInt local_, others_ = 0;

@@ -33,6 +33,7 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
       row_sums_.back()[row - model.first_dof()] += std::abs(value);
     });
     blocked_.emplace_back();
+    blocked_.back().stiffness = term.order == 0 && term.phase == 0;
     if (!is_dense(term.A)) {
       blocked_.back().sparse.emplace(term.A, h.block_size());
       continue;
@@ -40,7 +41,7 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
     blocked_.back().dense.assign(size_t(model.local_dofs()) * model.dofs(), 0.0);
     for (auto const& entry : entries(term.A))
       blocked_.back().dense[size_t(entry.row - model.first_dof()) * model.dofs() + entry.col] = entry.value;
-    if (term.order == 0 && term.phase == 0)
+    if (blocked_.back().stiffness)
       blocked_.back().split = SplitMatrix(blocked_.back().dense, int(model.local_dofs()), int(model.dofs()));
   }
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
@@ -120,7 +121,11 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked& A, Vec
   const int m = harmonics_.block_size(), local = int(model_.local_dofs()), all = int(model_.dofs());
   if (A.sparse) {
     multiply(harmonics_, c, ReadArray(x).data(), A.sparse->columns(), local);
-    return A.sparse->multiply_add(y);
+    if (!exactly || !A.stiffness) return A.sparse->multiply_add(y);
+    check(VecSet(work_, 0));
+    A.sparse->multiply_exactly(y, work_);
+    check(VecAXPY(y, 1, work_));
+    return;
   }
   multiply(harmonics_, c, ReadArray(x).data(), WriteArray(work_).data(), local);
   const auto X = gathered(work_);

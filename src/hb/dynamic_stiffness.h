@@ -17,7 +17,7 @@ class DynamicStiffness {
   void multiply_add(Exponents const&, Vec x, Vec y, int order = -1);
   /// y += Z^T x. Collective.
   void transposed_multiply_add(Exponents const&, Vec x, Vec y);
-  /// y += Z x, dense stiffness without its rounding (`SplitMatrix`): for residuals. Collective.
+  /// y += Z x, stiffness without its rounding (`SplitMatrix`, `exact_rows.h`): for residuals. Collective.
   void multiply_add_exactly(Exponents const&, Vec x, Vec y);
   /// y += dZ x for a change (ds, dg) of the exponents, always of the same x until it `has_moved`. Collective.
   void derivative_multiply_add(Exponents const&, Exponents const& change, Vec x, Vec y);
@@ -40,7 +40,8 @@ class DynamicStiffness {
   struct Blocked {
     std::optional<BlockedProduct> sparse;
     std::vector<double> dense;  ///< local rows x all dofs, row-major
-    SplitMatrix split;          ///< of a stiffness
+    bool stiffness;             ///< its forces cancel
+    SplitMatrix split;          ///< of a dense one
   };
   /// A term whose matrix is so many times that of the product.
   struct Part {

@@ -51,16 +51,22 @@ class Reduction {
   std::vector<double> project(std::span<double const> forces, PetscInt count) const;
 
  private:
+  using Columns = std::vector<double>;  ///< this rank's rows, column by column
+  static PetscInt panel_of(PetscInt columns);
   double* column(PetscInt j) { return T_.data() + size_t(j) * size_t(local_); }
-  std::vector<double> moved(BlockedProduct& A, PetscInt begin, PetscInt end);
-  void place_constraint_modes(Mat K, FixedInterface const&, std::vector<PetscInt> const& internal);
-  void place_component_modes(std::vector<ComponentMode> const&, std::vector<PetscInt> const& internal);
-  std::vector<double> congruence(Mat A, PetscInt n, bool symmetric);
+  Columns moved(BlockedProduct& A, PetscInt begin, PetscInt end, Columns* low = nullptr);
+  std::vector<double> place_constraint_modes(Mat K, FixedInterface const&);
+  void add_inside(Mat X, PetscInt begin, PetscInt end);
+  void place_left(Columns const& KT, Mat B, PetscInt columns);
+  void take_forces(Columns& KT, Columns const& low, PetscInt begin, PetscInt end,
+                   std::vector<double>& of_kept);
+  void place_component_modes(std::vector<ComponentMode> const&);
+  std::vector<double> congruence(Mat A, bool symmetric);
   void omit(PetscInt modes);
 
   MPI_Comm comm_ = MPI_COMM_NULL;
   PetscInt local_ = 0, global_ = 0, first_ = 0;
-  std::vector<PetscInt> kept_;
+  std::vector<PetscInt> kept_, internal_;  ///< the latter this rank's, ascending
   std::vector<double> component_omega_, K_, M_, C_, T_;
   OmittedModes omitted_;
   ReductionTimes times_;

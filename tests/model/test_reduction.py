@@ -204,6 +204,25 @@ def test_reduced_matrices_are_the_congruence_with_the_expanded_unit_vectors(bloc
         np.testing.assert_array_equal(reduction.M[n:, n:], np.eye(6))
 
 
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no numbers of more digits to compare with")
+@pytest.mark.ranks(1, 2, 3)
+@pytest.mark.parametrize("cells", [(6, 2, 2), (25, 2, 2), (200, 1, 1)])
+def test_stiffness_of_the_kept_dofs_is_rounded_once(cells: tuple[int, int, int]) -> None:
+    """Terms of K are up to 1e8 times what is left of them: with every product rounded 7 to 700 last digits off."""
+    made = bar(cells, (0.25, 0.02, 0.02))
+    keep, K = root_and_tip(made), sp.csr_matrix((made.K + made.K.T) / 2)  # its rounding is not symmetric
+    inside = np.setdiff1d(np.arange(K.shape[0]), keep)
+    factor = scipy.sparse.linalg.splu(K[inside][:, inside].tocsc())
+    x = np.zeros((K.shape[0], len(keep)), np.longdouble)
+    x[keep] = np.eye(len(keep))
+    for _ in range(4):
+        x[inside] -= factor.solve((K.astype(np.longdouble) @ x)[inside].astype(float))
+    exact = (K.astype(np.longdouble) @ x)[keep]
+    with reduce(made.M, K, keep=keep, modes=1) as reduction:
+        off = np.abs(reduction.K[: len(keep), : len(keep)] - exact).max()
+        assert off <= np.spacing(float(np.abs(exact).max()))
+
+
 def test_kept_dofs_stand_in_the_order_given(block: Bar) -> None:
     keep = root_and_tip(block)
     order = np.random.default_rng(2).permutation(len(keep))
