@@ -93,10 +93,14 @@ def has_analysis(folder: Path, case: Case, name: str) -> bool:
 
 
 def belongs(group: h5py.Group, case: Case, name: str) -> bool:
-    """Whether a group's results follow from the present model, contacts and keys of the analysis."""
+    """Whether a group's results follow from the present model, contacts and keys of the analysis.
+
+    Of a reduced case, on as many component modes: a run may have taken more of them than were chosen.
+    """
     try:
-        stored = json.loads(group.attrs["case"])
+        stored, reduction = json.loads(group.attrs["case"]), json.loads(group.attrs.get("reduction", "{}"))
     except (KeyError, ValueError):
         return False
-    points = group["points"]
-    return bool(stored == _deciding(case, name) and len(next(iter(points.values()))))
+    points, modes = group["points"], case.reduced and case.reduced.component_modes
+    same = stored == _deciding(case, name) and modes in (None, reduction.get("component_modes", modes))
+    return bool(same and len(next(iter(points.values()))))

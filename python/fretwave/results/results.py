@@ -267,6 +267,12 @@ class AnalysisWriter:
             self._journal.close()
             self._discard()
 
+    def forget(self) -> None:
+        """Leave nothing to go on with, closed or not."""
+        self._ending = None
+        self.abandon()
+        self._journal.remove()
+
     def _discard(self) -> None:
         if self._new is not None:
             self._new.discard()

@@ -28,6 +28,7 @@ from ..results.journal import Journal
 from ..results.results import has_results, open_results
 from ..results.runfolder import RunFolder, new_record, peak_memory_mb, results_folder
 from ..texts import counted, display
+from . import more_modes
 from .left_out import left_out_lines
 from .order import RunOptions, in_order
 from .pictures import plot
@@ -139,12 +140,7 @@ class Runner:
         self.wide = run_wide(self.case, names, self.options.petsc, self.unread.read)
         check_in_time(self.case, names, self.wide)
         self._greet(names)
-        self._reduce([name for name in names if name not in sweeps])
-        try:
-            self._run_all(names, sweeps)
-        finally:
-            if self.case.basis is not None:
-                self.case.basis.destroy()
+        self._solve(names, sweeps)
         self._say_left_out(names)
         self._say_unread()
         self._finish()
@@ -152,9 +148,35 @@ class Runner:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
         return EXIT_DONE
 
-    def _run_all(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
+    def _solve(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
+        """All analyses; anew, all on one basis, where one of them finds the component modes too few."""
+        given, reduced, again = self.case, [name for name in names if name not in sweeps], self.resuming
+        while True:
+            self._reduce(reduced)
+            try:
+                return self._run_all(names, sweeps, again)
+            except more_modes.TooFewModes as error:
+                few = error.entry
+            finally:
+                if self.case.basis is not None:
+                    self.case.basis.destroy()
+            self.case, again = given, True
+            self._forget(reduced, few)
+
+    def _forget(self, names: Sequence[str], few: Mapping[str, Any]) -> None:
+        """What was found on too few component modes is not of this run any more. Collective."""
+        record = self.folder.record
+        record.setdefault(more_modes.GREW, []).append(few)
+        record["analyses"] = {name: entry for name, entry in record["analyses"].items() if name not in names}
+        self.failures.clear()
+        self.unread.lines.clear()
+        on_first_rank(self.comm, lambda: (self.folder.path / NAME).unlink(missing_ok=True))
+        on_first_rank(self.comm, self.folder.save)
+        self.console.line(f"{more_modes.line(record)}; begun anew")
+
+    def _run_all(self, names: Sequence[str], sweeps: Mapping[str, Sweep], again: bool) -> None:
         for number, name in enumerate(names, 1):
-            if self.resuming and self._is_done(name):
+            if again and self._is_done(name):
                 continue
             if len(names) > 1:
                 self.console.line(f"{name}: {number} of {len(names)} analyses")
@@ -191,7 +213,8 @@ class Runner:
         at = None if self.case.reduction is None else self.case.reduction.error_at
         asked = at is not None and any(self.case.analyses[name].passes(at) for name in names)
         with self.unread.steering_reduction(self.wide, self.case.reduction is not None):
-            self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=asked, only=names)
+            modes = more_modes.grown(self.folder.record)
+            self.case = reduce_case(self.case, self.comm, modes, look=self._keep_basis, keep=asked, only=names)
         if self.case.reduced is not None:
             for line in self.case.reduced.lines():
                 self.console.line(line)
@@ -236,8 +259,9 @@ class Runner:
         if not has_results(self.folder.path):
             return None
         with open_results(self.folder.path / "results.h5") as file:
-            mine = name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
-            return str(file[name].attrs.get("status")) if mine else None
+            found, record = file[name].attrs if name in file else {}, self.folder.record
+            mine = found.get("run_id") == record["run_id"] and more_modes.on_these(record, found)
+            return str(found.get("status")) if mine else None
 
     def _is_done(self, name: str) -> bool:
         def look() -> str | None:
@@ -295,6 +319,11 @@ class Runner:
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
             unread = self.unread.of_analysis(options)
+        try:
+            more_modes.expect_enough(self.case, analysis.name, outcome.reason)
+        except more_modes.TooFewModes:
+            context.forget()
+            raise
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
         if unread and outcome.points:
@@ -356,6 +385,8 @@ class Runner:
         self.folder.record["peak_memory_mb"] = peak_memory_mb(self.comm)
         if self.options.plots and self.folder.started:
             on_first_rank(self.comm, lambda: plot(self.folder.path, self.console))
+        if grew := more_modes.line(self.folder.record):
+            self.console.line(grew)
         word, seconds = self.folder.record["status"], self.clock.passed()
         self.console.line(
             f"{word} after {duration(seconds)}; `fretwave show {display(self.folder.path)}` lists the results"

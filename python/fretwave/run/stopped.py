@@ -37,7 +37,7 @@ def without(name: str, needed: str) -> Outcome:
 
 def advice(name: str, reason: str) -> str:
     """What most often helps against a reason to stop."""
-    if f"{REACHED}; accuracy" in reason:
+    if limited_by(reason):
         return _of_accuracy(name, reason)
     if "number of points" in reason:
         return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
@@ -76,14 +76,21 @@ def advice(name: str, reason: str) -> str:
 
 def _of_accuracy(name: str, reason: str) -> str:
     """Of a branch that is whole, but not as accurate as it was to be: against what limits it most often."""
-    shares = [(int(found[1]), found[2]) for found in re.finditer(r"(\d+) limited by (?:the )?(\w+)", reason)]
-    source, milder = max(shares, default=(0, ""))[1], f"a milder --set {name}.accuracy=..."
+    milder = f"a milder --set {name}.accuracy=..."
     helps = {
         "reduction": f"more component modes ([reduction] modes, in place of those chosen), or {milder}",
         "solver": f"a tighter tolerance (--petsc '-snes_rtol 1e-12'), or {milder}",
         "errors": f"harmonics and samples of your own in place of {name}.accuracy",
     }
-    return helps.get(source, milder)
+    return helps.get(limited_by(reason), milder)
+
+
+def limited_by(reason: str) -> str:
+    """What limits most points of a branch that is whole, but not as accurate as it was to be; else nothing."""
+    if f"{REACHED}; accuracy" not in reason:
+        return ""
+    shares = [(int(found[1]), found[2]) for found in re.finditer(r"(\d+) limited by (?:the )?(\w+)", reason)]
+    return max(shares, default=(0, ""))[1]
 
 
 def _other_end(name: str, reason: str) -> str:

@@ -214,6 +214,15 @@ class AnalysisContext(Generic[Section]):
 
         on_first_rank(self.comm, finish)
 
+    def forget(self) -> None:
+        """Leave nothing of its tables to go on with. Collective."""
+
+        def remove() -> None:
+            for writer in self.writers:
+                writer.forget()
+
+        on_first_rank(self.comm, remove)
+
     def table(self, name: str) -> dict[str, Any]:
         """Columns of a finished analysis (``event`` included) on every rank. Collective.
 
