@@ -76,6 +76,16 @@ def test_error_known_on_all_ranks_is_said_once(launch, ranks: int) -> None:
     assert "MPI_ABORT" not in done.stderr
 
 
+@pytest.mark.parametrize("late", [0, 1])
+@pytest.mark.parametrize("seconds", [1.4, 1.49])
+def test_error_of_a_rank_that_comes_late_is_said_once(launch, late: int, seconds: float) -> None:
+    """As the other rank gives up waiting for it, whose message is then the one: there were two on a loaded machine."""
+    fails = "raise InputError('bad', 'here', 1, 2, 'mend it')"
+    done, _ = run(launch, f"import time\ntime.sleep({seconds} if comm.rank == {late} else 0)\n{fails}")
+    assert done.returncode == 2
+    assert messages(done.stderr, "error: bad") == 1
+
+
 def test_error_found_by_the_first_rank_reaches_all(launch) -> None:
     body = "def fail():\n    raise InputError('bad')\non_first_rank(comm, fail)"
     done, _ = run(launch, body)

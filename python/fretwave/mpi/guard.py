@@ -54,22 +54,25 @@ def launched_rank() -> int:
 
 
 def all_ranks_failed(comm: MPI.Comm) -> bool:
-    """True when every rank gets here within `AGREEMENT_WAIT` seconds.
+    """True when every rank gets here within `AGREEMENT_WAIT` seconds; False on one rank after the other.
 
-    A barrier on the world would match a barrier of ranks that are well, so a private message ring is
-    used: rank 0 hears from all and answers.
+    A barrier on the world would match a barrier of ranks that are well, so private messages are used: rank 0 hears
+    from all and answers, and hears whether its answer was waited for. A rank that has none in time prints its message
+    and ends all: rank 0, when it comes late, leaves both to it.
     """
-    tag = 32001
-    others = range(1, comm.size)
+    tag, heard = 32001, 32002
     if comm.rank:
         comm.isend(None, dest=0, tag=tag)
-        answers = [comm.irecv(source=0, tag=tag)]
-    else:
-        answers = [comm.irecv(source=rank, tag=tag) for rank in others]
-    complete = _wait(answers, AGREEMENT_WAIT + RANK_DELAY * bool(comm.rank))
-    if complete and comm.rank == 0:
+        complete = _wait([comm.irecv(source=0, tag=tag)], AGREEMENT_WAIT + RANK_DELAY * (1 + comm.rank))
+        comm.isend(complete, dest=0, tag=heard)
+        return complete
+    others = range(1, comm.size)
+    complete = _wait([comm.irecv(source=rank, tag=tag) for rank in others], AGREEMENT_WAIT)
+    if complete:
         for request in [comm.isend(None, dest=rank, tag=tag) for rank in others]:
             request.wait()
+        if not all([comm.recv(source=rank, tag=heard) for rank in others]):
+            time.sleep(AGREEMENT_WAIT)
     return complete
 
 
@@ -150,7 +153,6 @@ def end_all_ranks(error: BaseException, traced: bool = False) -> int:
         if comm.rank == 0:
             _print(describe(error, None, traced))
         return code
-    time.sleep(RANK_DELAY * comm.rank)
     _print(describe(error, comm.rank, traced))
     comm.Abort(code)
     return code
@@ -178,7 +180,6 @@ def _lone_exit(exit_: SystemExit) -> int:
         if isinstance(exit_.code, str) and (comm is None or comm.rank == 0):
             _print(exit_.code)
         return code
-    time.sleep(RANK_DELAY * comm.rank)
     _print(f"error: rank {comm.rank} left (exit code {code}) while other ranks went on")
     comm.Abort(code or EXIT_OTHER)
     return code
@@ -248,7 +249,6 @@ def caught_by_all(comm: MPI.Comm, error: FretwaveError) -> None:
     """
     if comm.size == 1 or all_ranks_failed(comm):
         return
-    time.sleep(RANK_DELAY * comm.rank)
     _print(describe(error, comm.rank))
     comm.Abort(exit_code_of(error))
 
