@@ -388,6 +388,17 @@ class Model(Destroyable):
         ranks = f", {self.comm.size} ranks" if self.comm.size > 1 else ""
         return f"Model({self.n_dof} dofs, contacts {[contact.name for contact in self.contacts]}{wave}{ranks})"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Of one rank, with its state at rest: what is made of it, in another process too, is a model on one rank."""
+        if self.comm.size > 1:
+            what, fix = "a model on several ranks cannot be pickled", "make it again in its place, or on MPI.COMM_SELF"
+            raise InputError(what, repr(self), f"{self.comm.size} ranks", "1", fix)
+        self.check_unchanged()
+        K, C, M = ({k: _csr(A) for A, own, k in self._terms if own == order} for order in range(3))
+        wave = {"sectors": self.sectors, "nodal_diameter": self.nodal_diameter, "unit": self._unit}
+        own = {"contacts": self.contacts, "units": self.units, "omitted": self.omitted}
+        return _model_again, ({"M": M, "K": K, "C": C or None, **wave, **own}, self.at_rest)
+
     def destroy(self) -> None:
         """Free the matrices. Collective."""
         self._core = None
@@ -403,3 +414,17 @@ def _unit_of(given: object) -> int:
         what, fix = "ranks take no such groups of dofs", "give the number of dofs of a sector, or leave it out"
         raise InputError(what, "Model(unit=...)", shortened(repr(given), 60), "a whole number from 1 up", fix)
     return unit
+
+
+def _csr(A: PETSc.Mat) -> sp.csr_matrix:
+    """Of one rank."""
+    rows, columns, values = A.getValuesCSR()
+    return sp.csr_matrix((values, columns, rows), shape=A.getSize())
+
+
+def _model_again(given: dict[str, Any], at_rest: Rest | None) -> Model:
+    """What was pickled."""
+    model = Model(**given, comm=MPI.COMM_SELF)
+    if at_rest is not None:
+        model.settle(at_rest)
+    return model
