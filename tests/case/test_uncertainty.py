@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -130,14 +131,15 @@ def test_check_says_what_is_drawn(tmp_path: Path, capfd) -> None:
     assert call("check", path) == 0
     said = capfd.readouterr().out
     assert "no seed, nothing is drawn" in said
-    assert "contact.slider.friction_limit: lognormal, mean 2, standard deviation 0.5" in said
+    assert "contact.slider.friction_limit: lognormal, mean 2 N, standard deviation 0.5 N\n" in said
     assert call("check", path, "--set", "contact.slider.friction_limit=3.0") == 0
     assert "friction_limit = 3" in capfd.readouterr().out
     assert call("check", path, "--set", "uncertainty.seed=4") == 0
     said = capfd.readouterr().out
     value = load_case(path, ["uncertainty.seed=4"]).contacts[0].parameters["friction_limit"]
     assert "uncertainty (seed 4): factor on contact.slider.tangential_stiffness: uniform, 0.8 to 1.2; drawn" in said
-    assert f"drawn: {value:.6g}" in said
+    assert f"drawn: {value:.6g} N\n" in said
+    assert re.search(r"0.8 to 1.2; drawn: [0-9.]+\n", said), "a factor has no unit"
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from fretwave.post.grid import Plan
 from fretwave.post.quantiles import interval_ranks
 from fretwave.results.reader import Run
 from fretwave.results.sweep_quantiles import quantile_lines, quantile_rows
+from fretwave.results.sweeps import write_sweep
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -239,3 +240,21 @@ def test_the_seed_decides_the_wheel(wheels: Path) -> None:
     for number in (0, 5):
         resolved = json.loads((wheels / "values" / f"{number:04d}" / "run.json").read_text())["case"]["resolved"]
         assert resolved["forced.mistuning"]["seed"] == number + 1 == resolved["uncertainty.seed"]
+
+
+def test_one_seed_alone_is_told_as_any_value(tmp_path: Path, capsys) -> None:
+    """Its table of quantiles was an empty file, left where an earlier sweep had some, and nothing was told."""
+    text = CASE.replace("amplitude = [0.05, 60.0]", "amplitude = [0.05, 0.2]")
+    (tmp_path / "case.toml").write_text(UNCERTAIN + text)
+    words = ["--only", "mode", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", tmp_path / "case.toml", "--over", "uncertainty.seed=1", *words) == 0
+    assert not list((tmp_path / "run").glob("*quantiles*"))
+    assert "mode: seed = 1: " in capsys.readouterr().out
+    assert len(rows(tmp_path / "run" / "summary.csv")) == 1
+
+
+def test_no_table_where_too_few_came_to_their_end(tmp_path: Path) -> None:
+    path = tmp_path / "mode_quantiles.csv"
+    path.write_text("of an earlier sweep\n")
+    write_sweep(tmp_path, "mode", "mode", Plan({"uncertainty.seed": [1, 2]}), [], {})
+    assert not path.exists()

@@ -26,6 +26,7 @@ from .facts import Facts
 from .fields import Section
 from .flow import check_aerodynamics
 from .gauges import read_gauges
+from .key_units import key_units
 from .loads_at_speed import check_speed, with_loads
 from .origin import check_physics, load_origin
 from .plugins import Plugin, read_plugins
@@ -86,12 +87,14 @@ def load_case(
     loaded = read_plugins(source, found, plugins)
     if len(found) > len(source.problems):  # what they would have added is missing everywhere
         raise CaseErrors(_in_file_order(found), source.label)
-    case = _build(source, _core_laws() if laws is None else laws, loaded, found)
+    laws = _core_laws() if laws is None else laws
+    case = _build(source, laws, loaded, found)
     if found or case is None:
         advise(found, uncertainty)
         raise CaseErrors(_in_file_order(found), source.label)
     if uncertainty is None:
         return case
+    uncertainty = uncertainty.in_units(key_units(source, [one.key for one in uncertainty.draws], laws, case.units))
     return replace(case, uncertainty=uncertainty, resolved={**case.resolved, **uncertainty.resolved()})
 
 

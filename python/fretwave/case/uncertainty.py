@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,12 +45,15 @@ class Draw:
         As ``--set`` addresses it.
     factor : bool
         The draw multiplies what the case, its builder or its model file gives.
+    unit : str
+        Symbol of what is drawn, empty where it has none or is not known yet.
     """
 
     key: str
     factor: bool
     given: DistributionSection
     value: float | None = None
+    unit: str = ""
 
     @property
     def name(self) -> str:
@@ -60,11 +63,14 @@ class Draw:
     def line(self) -> str:
         """In words."""
         g = self.given
+        unit = f" {self.unit}" if self.unit else ""
         even = g.distribution == "uniform"
         numbers = (
-            f"{g.low:g} to {g.high:g}" if even else f"mean {g.mean:g}, standard deviation {g.standard_deviation:g}"
+            f"{g.low:g} to {g.high:g}{unit}"
+            if even
+            else f"mean {g.mean:g}{unit}, standard deviation {g.standard_deviation:g}{unit}"
         )
-        drawn = "" if self.value is None else f"; drawn: {self.value:.6g}"
+        drawn = "" if self.value is None else f"; drawn: {self.value:.6g}{unit}"
         return f"{'factor on ' if self.factor else ''}{self.key}: {g.distribution}, {numbers}{drawn}"
 
 
@@ -87,6 +93,11 @@ class Uncertainty:
         seed = "no seed, nothing is drawn" if self.seed is None else f"seed {self.seed}"
         wheels = [f"{name}.mistuning.seed: that of [uncertainty]" for name in self.wheels]
         return [f"uncertainty ({seed}): {line}" for line in [*(draw.line() for draw in self.draws), *wheels]]
+
+    def in_units(self, units: Mapping[str, str]) -> Uncertainty:
+        """With the symbols of the units of keys; a factor has none."""
+        draws = (one if one.factor else replace(one, unit=units.get(one.key, "")) for one in self.draws)
+        return replace(self, draws=tuple(draws))
 
     def resolved(self) -> dict[str, Any]:
         """What decides the results, by address; nothing without a seed."""

@@ -26,8 +26,8 @@ def is_seed(key: str) -> bool:
 
 
 def over_seeds(plan: Plan) -> bool:
-    """A sweep over draws, alone or among others."""
-    return any(is_seed(key) for key in plan.keys)
+    """A sweep over draws, alone or among others; one of them has no quantiles."""
+    return any(is_seed(key) and len(values) > 1 for key, values in plan.over.items())
 
 
 def crossed(plan: Plan) -> bool:

@@ -160,7 +160,11 @@ def write_sweep(
     if over_seeds(plan):
         left_out = (*OF_COST, *_lacking(summary_of(kind).cut_off, rows))
         told = [column for column in columns if column.kind == "f" and column.name not in left_out]
-        write_rows(folder / f"{name}_quantiles.csv", quantile_rows(plan, rows, told, split_of(kind)), keys)
+        table, path = quantile_rows(plan, rows, told, split_of(kind)), folder / f"{name}_quantiles.csv"
+        if table:
+            write_rows(path, table, keys)
+        else:  # too few came to their end
+            path.unlink(missing_ok=True)
     with rewritten(folder / "results.h5", name) as file:
         file.attrs["title"] = title
         group = file.create_group(name)
