@@ -51,3 +51,12 @@ def test_first_slip_is_expected_where_the_response_under_the_flow_peaks(
     found = re.search(r"first slip expected at level (\S+) \((\S+) Hz", said)
     assert found, said
     assert [float(text) for text in found.groups()] == pytest.approx(first_slip(influence, order, deviations), rel=5e-3)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("keys, said", [("", 1), ("aerodynamics = true", 0)], ids=["without", "with"])
+def test_it_is_said_that_the_flow_is_left_out(tmp_path, capfd, keys: str, said: int) -> None:
+    """As the run's last words say it."""
+    (tmp_path / "case.toml").write_text(case_of(SHIFTS, 1, keys), encoding="utf-8")
+    assert call("check", tmp_path / "case.toml", "--no-solve") == 0
+    assert capfd.readouterr().out.count("    left out: the forces of the flow (aerodynamics = false)\n") == said

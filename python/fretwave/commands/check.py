@@ -16,6 +16,7 @@ from ..errors import EXIT_DONE, CaseErrors, FretwaveError, NotConverged
 from ..model.contact import span
 from ..mpi.guard import on_first_rank
 from ..run.at_rest import at_rest
+from ..run.left_out import of_the_flow
 from ..run.order import RunOptions, in_order
 from ..run.runner import check_sweeps
 from ..run.stopped import joined
@@ -66,7 +67,8 @@ def check_case(
 def _described(case: Case, name: str, model: Model) -> list[str]:
     """What an analysis would compute. Collective."""
     analysis = case.analyses[name]
-    return [analysis.headline(), *analysis.details(model, case.preload_of(analysis) is not None)]
+    left_out = [f"left out: {reason}" for reason in of_the_flow(case, analysis)]
+    return [analysis.headline(), *analysis.details(model, case.preload_of(analysis) is not None), *left_out]
 
 
 def _one(failures: Sequence[FretwaveError], case: Case) -> FretwaveError:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Optional
+from typing import Any
 
 from ..case.analysis import AnalysisSection
-from ..case.harmonic import HarmonicSection
 from ..case.load import Case
 from ..texts import toml
 
@@ -42,7 +41,7 @@ def _line(where: str, reasons: Sequence[str]) -> str:
 def _of_an_analysis(case: Case, analysis: AnalysisSection) -> list[str]:
     """What it does not say itself."""
     harmonic = analysis.settings(case).harmonic()
-    found = _of_the_flow(case, analysis, harmonic)
+    found = of_the_flow(case, analysis)
     if harmonic is None:
         return found
     if case.neighbours is not None and (analysis.wears or not harmonic.wheel):
@@ -53,8 +52,9 @@ def _of_an_analysis(case: Case, analysis: AnalysisSection) -> list[str]:
     return found
 
 
-def _of_the_flow(case: Case, analysis: AnalysisSection, harmonic: Optional[HarmonicSection]) -> list[str]:
+def of_the_flow(case: Case, analysis: AnalysisSection) -> list[str]:
     """That a case has forces which this analysis does not take."""
+    harmonic = analysis.settings(case).harmonic()
     if (
         case.aerodynamics is None
         or analysis.type == "sweep"
