@@ -178,6 +178,20 @@ def test_nodes_under_static_loads_rest_as_without_reduction(runs, tmp_path: Path
                     assert rest[0][f"{name}_amplitude"] == pytest.approx(mean, rel=SOLVED, abs=SOLVED * 1e-6)
 
 
+def test_a_node_on_component_modes_that_were_chosen_moves_the_same_on_a_basis_made_again(tmp_path, capsys) -> None:
+    """As many as the run has taken: all 12, and not the 10 that a case without an accuracy has."""
+    shutil.copy(BUILDER, tmp_path / "model.py")
+    text = CHAIN.replace("modes = 12", "accuracy = 1e-9\ncompare = 3")
+    (tmp_path / "case.toml").write_text(text + ANALYSES[: ANALYSES.index('[[analysis]]\nname = "wear"')])
+    folder = tmp_path / "run"
+    assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", folder) == 0
+    kept = rows_of(capsys, folder, "--node", 2, "--csv", "--at", "end")
+    (folder / "reduction.h5").unlink()
+    again = rows_of(capsys, folder, "--node", 2, "--csv", "--at", "end")
+    for one, other in zip(kept, again):
+        assert other["x_amplitude"] == pytest.approx(one["x_amplitude"], rel=SOLVED, abs=SOLVED * 1e-6)
+
+
 def test_a_dof_of_a_model_without_reduction_is_its_node(runs, capsys) -> None:
     dof, node = (rows_of(capsys, runs["whole"], *words, "--csv") for words in (("--dof", "tip"), ("--node", 5)))
     for one, other in zip(dof, node):

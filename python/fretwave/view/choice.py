@@ -55,6 +55,7 @@ class Choice:
     contacts : histories per point, by the contact's name; none unless every point keeps them
     without : points that do not keep the motion of their contacts
     highest_component_hz : of the run's reduction, 0 without component modes
+    component_modes : how many it has taken, where that is known
     diameters : nodal diameters of the wave on one sector, per point; 0 for a structure
     wheel : the coordinates are those of all sectors of a wheel, one after the other
     sample_count : of a period
@@ -75,6 +76,7 @@ class Choice:
     without: list[int]
     loaded: bool = False
     highest_component_hz: float = 0.0
+    component_modes: int | None = None
     diameters: Sequence[int] = ()
     wheel: bool = False
     sample_count: int = 1
@@ -156,6 +158,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
     samples = np.arange(steps) * count // steps
     rows = [row for row, _ in chosen]
     without = [row for row in rows if row not in held]
+    reduction = json.loads(group.attrs.get("reduction", "{}"))
     return Choice(
         name=name,
         points=rows,
@@ -169,7 +172,8 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
         phases=2 * np.pi * samples / count,
         contacts={} if without else _contacts(group, case, rows),
         without=without,
-        highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
+        highest_component_hz=reduction.get("highest_component_hz", 0.0),
+        component_modes=reduction.get("component_modes"),
         diameters=_diameters(group, case, name, rows),
         wheel=case.neighbours is not None and case.analyses[name].whole_wheel()[0],
         sample_count=count,

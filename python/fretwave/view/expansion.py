@@ -83,13 +83,13 @@ def expansion_of(case: Case, choice: Choice, folder: Path, around: int, stack: E
     kept = read_basis(folder / NAME)
     if kept is not None:
         _check_model(case, kept.model)
-    basis = _made_again(case, stack) if kept is None else kept
+    basis = _made_again(case, choice.component_modes, stack) if kept is None else kept
     _check_same(case, choice, basis, around)
     return basis
 
 
-def _made_again(case: Case, stack: ExitStack) -> Expansion:
-    """Of a run that does not keep the basis of its reduction."""
+def _made_again(case: Case, modes: int | None, stack: ExitStack) -> Expansion:
+    """Of a run that does not keep the basis of its reduction, on as many component modes as it has taken."""
     try:
         from mpi4py import MPI
 
@@ -103,7 +103,7 @@ def _made_again(case: Case, stack: ExitStack) -> Expansion:
             "mpi4py and PETSc: the reduction is made again to reach the nodes that the run does not keep",
             "view it where the case was run; `fretwave show` and `fretwave plot` need neither",
         ) from None
-    reduction = reduction_of(case, MPI.COMM_SELF)
+    reduction = reduction_of(case, MPI.COMM_SELF, modes)
     stack.callback(reduction.destroy)
     hz, loads = reduction.highest_component_hz, (case.structure.cut or case.structure).loads
     if isinstance(reduction, SectorReduction):
