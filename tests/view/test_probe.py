@@ -260,6 +260,11 @@ def test_pairs_of_flutter_have_their_places_and_pressures(tmp_path: Path, capsys
         assert len(pairs) == len(areas)
         for pair, area in zip(pairs, areas):
             assert pair["pressure_mean"] == pytest.approx(pair["normal_mean"] / area, rel=LAST_DIGITS)
+    last = len(fw.open_run(tmp_path / "run")["flutter"]["nodal_diameter"]) - 1
+    assert call("view", tmp_path / "run", "--point", 0, last) == 0
+    said = capsys.readouterr().out
+    assert "flutter: point 0, nodal diameter 1, amplitude 5e-06 m, " in said
+    assert f"flutter: point {last}, nodal diameter 2, amplitude " in said
 
 
 def jenkins(amplitude: float, n: int = 4096) -> tuple[np.ndarray, np.ndarray]:

@@ -20,6 +20,7 @@ from ..model.law_info import kept_laws
 from ..post.contact_history import ContactHistory
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
+from ..results.parts import PARTS
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
 from .options import ViewOptions
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 #: Columns of the branch that go with a picture.
 SHOWN = (
-    *("point", "amplitude", "largest_amplitude", "cycles", "frequency_hz", "zeta", "level"),
+    *("point", "amplitude", "largest_amplitude", "cycles", "frequency_hz", "zeta", "level", "nodal_diameter"),
     *("stick", "slip", "open"),
 )
 
@@ -133,7 +134,9 @@ class Choice:
             values = f"amplitude {amplitude:.6g} {self.unit}"
             if "largest_amplitude" in self.states:
                 values += f" (largest of all sectors {self.states['largest_amplitude'][row]:.6g})"
-            yield f"{self.name}: point {point}, {values}, {frequency:.6g} Hz{asked}"
+            parts = [part for part in PARTS if part in self.states]
+            branch = "".join(f"{part.replace('_', ' ')} {self.states[part][row]:g}, " for part in parts)
+            yield f"{self.name}: point {point}, {branch}{values}, {frequency:.6g} Hz{asked}"
         if self.without and with_contacts:
             numbers = ", ".join(str(point) for point in self.without)
             yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"
