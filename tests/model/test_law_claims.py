@@ -209,3 +209,28 @@ def test_a_script_with_an_own_law_ends_without_words() -> None:
     """Its model and its functions hold each other to the end: nanobind had 40 lines on that."""
     done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+class Twisted(fw.PythonLaw):
+    """f = A u + sin(C v), of three components and pairs that differ; counts how often it is asked."""
+
+    components, calls = 3, 0
+    A, C = np.arange(9.0).reshape(3, 3), np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 3.0], [0.5, 0.0, 1.0]])
+
+    def force(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        self.calls += 1
+        weight = 1.0 + np.arange(u.shape[2])
+        return weight * (np.einsum("ij,njp->nip", self.A, u) + np.sin(np.einsum("ij,njp->nip", self.C, v)))
+
+
+@pytest.mark.parametrize("samples", [0, 1, 300, 3000], ids=["none", "one", "some", "many"])
+def test_tangents_by_differences_take_few_calls_of_a_force(samples: int) -> None:
+    """All twelve motions at once where they are small; exact for what is linear, else to the square of a step."""
+    random, law = np.random.default_rng(1), Twisted()
+    u, v = random.normal(size=(2, samples, 3, 2))
+    by_u, by_v = law.tangent(u, v)
+    assert law.calls == {300: 3, 3000: 12}.get(samples, 1)
+    weight = 1.0 + np.arange(2)
+    slope = np.cos(np.einsum("ij,njp->nip", law.C, v))
+    np.testing.assert_allclose(by_u, np.broadcast_to(law.A[:, :, None] * weight, by_u.shape), atol=1e-8)
+    np.testing.assert_allclose(by_v, weight * np.einsum("ij,nip->nijp", law.C, slope), atol=1e-8)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from ..errors import InputError
 from ..given import whole
 from .law_claims import OF_TANGENTS, check_motion, check_words, place_of, taken
 from .law_info import OPEN, SLIP, LawInfo, Limit, ParameterInfo
+
+#: Entries of the motions that a tangent by differences asks for at once.
+AT_ONCE = 1 << 13
 
 
 class PythonLaw:
@@ -74,7 +78,10 @@ class PythonLaw:
 
     def tangent(self, u: Array, v: Array) -> tuple[Array, Array]:
         """(df/du, df/dv), each (n_samples, components, components, n_pairs): [.., row, column, ..]."""
-        return self._difference(u, v, 0), self._difference(u, v, 1)
+        steps = [6e-6 * max(float(np.abs(moved).max(initial=0.0)), 1e-12) for moved in (u, v)]
+        forces = self._forces(self._moved(u, v, steps), u.size)
+        slopes = [(next(forces) - next(forces)) / (2 * step) for step in steps for _ in range(self.components)]
+        return np.stack(slopes[: self.components], axis=2), np.stack(slopes[self.components :], axis=2)
 
     def status(self, u: Array, v: Array, f: Array) -> npt.NDArray[Any]:
         """`STICK`, `SLIP` or `OPEN` (n_samples, n_pairs); by default open without a normal force, and slip else."""
@@ -98,16 +105,17 @@ class PythonLaw:
         name, text = cls.name or cls.__name__, (cls.__doc__ or "").strip().split("\n")[0]
         return LawInfo(name, text, cls.components, cls.parameters, normal=cls.normal, limit=cls.limit)
 
-    def _difference(self, u: Array, v: Array, which: int) -> Array:
-        columns = []
-        for column in range(self.components):
-            moved = (u, v)[which]
-            step = np.zeros_like(moved)
-            step[:, column] = 6e-6 * max(float(np.abs(moved).max(initial=0.0)), 1e-12)
-            moves = [(u + s, v.copy()) if which == 0 else (u.copy(), v + s) for s in (step, -step)]
-            plus, minus = (self._force(*moved) for moved in moves)
-            columns.append((plus - minus) / (2 * step[:, column : column + 1]))
-        return np.stack(columns, axis=2)
+    def _moved(self, u: Array, v: Array, steps: Sequence[float]) -> Iterator[tuple[Array, Array]]:
+        """Motions with a component of u, then of v, a step more and a step less."""
+        for which, column, sign in product((0, 1), range(self.components), (1, -1)):
+            motion = u.copy(), v.copy()
+            motion[which][:, column] += sign * steps[which]
+            yield motion
+
+    def _forces(self, motions: Iterator[tuple[Array, Array]], size: int) -> Iterator[Array]:
+        """Of motions of so many entries, many small ones at once, as samples: a call costs as much as these."""
+        while several := list(islice(motions, max(1, AT_ONCE // max(1, size)))):
+            yield from np.split(self._force(*(np.concatenate(parts) for parts in zip(*several))), len(several))
 
     def _evaluate(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
         """What the compiled core calls for the force."""
