@@ -77,6 +77,27 @@ class Slider(Cubic):
         return f
 
 
+class Steeper(Cubic):
+    """A tangent by 1 %: peaks of responses were off by far more than the errors told of them."""
+
+    def tangent(self, u: Any, v: Any) -> Any:
+        by_u, by_v = super().tangent(u, v)
+        by_u[:, 1, 1] *= 1.01
+        return by_u, by_v
+
+
+class Undamped(Cubic):
+    """A small force of the velocity that its tangents leave out."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        return super().force(u, v) + 1e-4 * v
+
+
+class Hidden(Cubic):
+    def __init__(self) -> None:
+        self.__dict__["gap"] = np.zeros(5)
+
+
 def followed(law: fw.PythonLaw) -> fw.Branch:
     model = fw.Model(np.eye(10), np.diag(1.0 + np.arange(10)) + 0.1, contacts=[fw.Contact(law, np.eye(10))])
     mode = fw.NonlinearMode(model, fw.choose_harmonics(model, 3, samples=64), dof=0)
@@ -92,6 +113,9 @@ WRONG = {
     Words: "returned a force that is no number",
     Counting: "depends on more than the present",
     Slider: "depends on more than the present",
+    Steeper: "the tangents of a law in Python are not those of its force",
+    Undamped: "the tangents of a law in Python are not those of its force",
+    Hidden: "`gap` of a law in Python is wrong",
 }
 
 
@@ -188,6 +212,37 @@ def test_axes_of_length_one_may_be_missing() -> None:
 
     f, df_du, _ = Flat()._evaluate(u := np.linspace(0.1, 1.0, 5)[:, None, None], 0 * u)
     assert f == pytest.approx(0.5 * u**3) and df_du[:, 0] == pytest.approx(1.5 * u**2, rel=1e-8)
+
+
+class Corner(fw.PythonLaw):
+    """With a corner in its force, a steep place or a jump at a sample: a difference there is no tangent."""
+
+    stuck_stiffness = 0.0
+
+    def __init__(self, u: Any, v: Any) -> None:
+        self.at = u, v
+
+    def force(self, u: Any, v: Any) -> Any:
+        past = v - self.at[1]
+        return np.maximum(0.0, u - self.at[0]) + np.tanh(past / 1e-9) + np.where(past > 0, 1.0, -1.0)
+
+    def tangent(self, u: Any, v: Any) -> Any:
+        steep = 1 / (1e-9 * np.cosh(np.clip((v - self.at[1]) / 1e-9, -300, 300)) ** 2)
+        return np.where(u > self.at[0], 1.0, 0.0)[:, :, None], steep[:, :, None]
+
+
+def test_where_differences_are_no_tangents_they_are_not_held_to_them() -> None:
+    u, v = np.full((1, 1, 1), 0.3), np.full((1, 1, 1), -0.7)
+    assert Corner(u, v)._evaluate(u, v)[2] == pytest.approx(1e9)
+
+
+@pytest.mark.parametrize("name", ["gap", "odd", "pairs", "stuck_stiffness"])
+def test_a_parameter_does_not_hide_what_laws_have(name: str) -> None:
+    """One of the name `pairs` was the numbers of the pairs, one of the name `gap` the method's place."""
+    parameters = (fw.ParameterInfo(name, "-", "of its own"),)
+    with pytest.raises(fw.InputError, match="has the name of a method") as error:
+        fw.register_law(type("Hiding", (Cubic,), {"parameters": parameters}))
+    assert error.value.measured == name
 
 
 SCRIPT = """

@@ -107,7 +107,7 @@ class Wrong(Silent):
 
 def test_a_state_that_there_is_not_is_refused() -> None:
     f = np.ones((1, 3, 1))
-    with pytest.raises(ValueError, match="other than STICK, SLIP and OPEN"):
+    with pytest.raises(fw.InputError, match="other than STICK, SLIP and OPEN"):
         fw.Contact(Wrong(), np.eye(3)).states(f, f, f)
 
 

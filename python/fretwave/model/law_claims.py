@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..errors import InputError
 from ..given import masked, real, whole
 from ..texts import shortened
+from .law_info import STATUS
 
 if TYPE_CHECKING:
     from .python_law import PythonLaw
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 #: Of the largest force: what two answers to one motion may differ by. Of the largest real part: what a Fourier
 #: transform and its inverse leave of an imaginary one; of tangents, which may be differences.
 SAME, ROUNDING, OF_TANGENTS = 1e-6, 1e-12, 1e-4
+#: Of a pair's own motion: steps of the differences that its tangents are held to. How far those may be off, and how far
+#: two differences, and the two sides of one, where they tell a tangent: not across a corner, nor at a steep place.
+STEPS, OFF, AGREE, SIDES = (1e-3, 5e-4), 1e-3, 1e-4, 1e-2
 MEMORY = "a law with a memory is a compiled one (src/CONTRIBUTING.md); else return what u and v of a sample alone give"
 
 
@@ -41,6 +45,11 @@ def check_words(law: PythonLaw) -> None:
         ),
         "odd": (isinstance(law.odd, bool), "True or False", "say whether f(-u, -v) = -f(u, v)"),
         "stuck_stiffness": (stiff_enough, "a number, or inf", "give the stiffness of the closed contact"),
+        **{
+            name: (callable(value), "a method", "give what hides it another name")
+            for name, value in vars(law).items()
+            if callable(getattr(type(law), name, None))
+        },
     }
     for name, (good, expected, fix) in wanted.items():
         if not good:
@@ -78,6 +87,20 @@ def taken(
     return np.ascontiguousarray(found, dtype=float).reshape(shape)
 
 
+def check_status(law: PythonLaw, status: Array) -> None:
+    """States are those that there are.
+
+    Raises
+    ------
+    InputError
+    """
+    other = status[~np.isin(status, list(STATUS.values()))]
+    if other.size:
+        what, fix = "a law in Python returned a status other than STICK, SLIP and OPEN", "return one for each pair"
+        expected = ", ".join(f"{name.upper()} ({value})" for name, value in STATUS.items())
+        raise InputError(what, place_of(law), other[0], expected, fix)
+
+
 def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
     """One sample of it gives the same force by itself, and of an odd law its mirror the opposite one.
 
@@ -97,6 +120,49 @@ def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
     if law.odd and not _same(-_alone(law, -u[at], -v[at])[..., pairs], f[at][..., pairs], f):
         what, fix = "a law in Python says `odd = True`, and is not", "leave `odd` out, or say False"
         raise InputError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
+
+
+def check_tangents(law: PythonLaw, u: Array, v: Array, f: Array, tangents: tuple[Array, Array]) -> None:
+    """Tangents that it gives are those of its force, at one sample and along one direction of u and of v.
+
+    Newton finds the same motion with others; peaks, folds and estimated errors are read off them.
+
+    Raises
+    ------
+    InputError
+    """
+    sample = int(np.argmax(np.abs(u * v).min(axis=1).max(axis=1)))
+    here = [np.repeat(moved[sample : sample + 1], 2 * len(STEPS), axis=0) for moved in (u, v)]
+    sides = np.array([side * step for step in STEPS for side in (1.0, -1.0)])[:, None, None]
+    for which, (name, tangent) in enumerate(zip(("du", "dv"), tangents)):
+        way = (-0.7) ** np.arange(law.components)[:, None] * np.abs(here[which][0]).max(axis=0)
+        moved = [part + sides * way if k == which else part for k, part in enumerate(here)]
+        given = (tangent[sample] * way).sum(axis=1)
+        forces = law.force(*(part.copy() for part in moved))
+        hidden = _hidden(forces)
+        with np.errstate(all="ignore"):
+            found, told = _slope(taken(law, "a force", forces, moved[0].shape), f[sample], hidden)
+            off = told & (np.abs(given - found) > OFF * np.maximum(np.abs(given), np.abs(found)) + hidden)
+        if off.any():
+            row, pair = np.argwhere(off)[0]
+            what, fix = "the tangents of a law in Python are not those of its force", "mend `tangent`, or leave it out"
+            ratio = f"of component {row}, df/{name} times a small motion is {given[row, pair]:.6g}"
+            raise InputError(what, place_of(law), ratio, f"{found[row, pair]:.6g}, by differences of `force`", fix)
+
+
+def _slope(forces: Array, f: Array, hidden: float) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Change of the force with a motion, by differences (components, pairs), and where these tell it."""
+    wide, narrow = ((forces[k] - forces[k + 1]) / (2 * step) for k, step in zip((0, 2), STEPS))
+    bent = np.abs(forces[0] + forces[1] - 2 * f) / (2 * STEPS[0])
+    agree = np.abs(wide - narrow) <= AGREE * np.abs(narrow) + hidden
+    return narrow, agree & (bent <= SIDES * np.abs(wide) + hidden)
+
+
+def _hidden(forces: npt.ArrayLike) -> float:
+    """What rounding hides of such a change."""
+    found = np.asarray(forces)
+    rounding = SAME if found.dtype == np.float32 else ROUNDING
+    return rounding * float(np.abs(found).astype(float).max(initial=0.0)) / STEPS[-1]
 
 
 def _alone(law: PythonLaw, u: Array, v: Array) -> Array:

@@ -84,7 +84,7 @@ def register_law(law: type[PythonLaw]) -> type[PythonLaw]:
     Raises
     ------
     InputError
-        A compiled law or one of another file has the name, or two parameters have one role.
+        Another law has the name, two parameters have one role, or one has the name of a method.
     """
     info = law.info()
     where = f"law '{info.name}'"
@@ -95,6 +95,15 @@ def register_law(law: type[PythonLaw]) -> type[PythonLaw]:
     twice = sorted({role.value for role in roles if roles.count(role) > 1})
     if twice:
         raise InputError("two parameters of a law have one role", where, twice, "one each", "leave a role out")
+    hidden = sorted(
+        p.name for p in info.parameters if hasattr(PythonLaw, p.name) or p.name in PythonLaw.__annotations__
+    )
+    if hidden:
+        what, fix = (
+            "a parameter of a law has the name of a method or attribute of laws in Python",
+            "rename the parameter",
+        )
+        raise InputError(what, where, ", ".join(hidden), "other names", fix)
     admit(LAW, info.name, _registered, law)
     _registered[info.name] = law
     return law

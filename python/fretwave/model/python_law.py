@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ..arrays import Array
 from ..errors import InputError
 from ..given import whole
-from .law_claims import OF_TANGENTS, check_motion, check_words, place_of, taken
+from .law_claims import OF_TANGENTS, check_motion, check_status, check_tangents, check_words, place_of, taken
 from .law_info import OPEN, SLIP, LawInfo, Limit, ParameterInfo
 
 #: Entries of the motions that a tangent by differences asks for at once.
@@ -27,7 +27,8 @@ class PythonLaw:
     pairs stick, slip and are open in tables, pictures and views.
 
     It is held to what it says of itself (`law_claims`): a force of another shape, odd or with a memory against its word
-    is refused. For that `force` is asked now and then for one sample of a motion, and for its mirror.
+    is refused, and tangents that are not those of the force. For that `force` is asked now and then for one sample of a
+    motion, for its mirror and beside it.
 
     With `register_law` a case names it as any other; it is then made with its parameters as keywords, each (n_pairs,).
 
@@ -123,6 +124,8 @@ class PythonLaw:
         self._evaluations += 1
         if self._evaluations & (self._evaluations - 1) == 0:  # 1, 2, 4, 8, ...
             check_motion(self, u, v, f)
+            if type(self).tangent is not PythonLaw.tangent:
+                check_tangents(self, u, v, f, tangents)
         return f, *tangents
 
     def _force(self, u: Array, v: Array) -> Array:
@@ -143,9 +146,9 @@ class PythonLaw:
     def _states(self, u: Array, v: Array, f: Array) -> tuple[Array, Array]:
         """What it calls for status and gap."""
         shape, given = (len(u), u.shape[2]), _copies(u, v, f)
-        return taken(self, "a status", self.status(*given), shape), taken(
-            self, "a gap", self.gap(*_copies(u, v, f)), shape
-        )
+        status = taken(self, "a status", self.status(*given), shape)
+        check_status(self, status)
+        return status, taken(self, "a gap", self.gap(*_copies(u, v, f)), shape)
 
 
 def _copies(*values: Array) -> list[Array]:
