@@ -85,3 +85,14 @@ def test_a_speed_that_adds_no_stiffness_is_not_compared(solves, tmp_path):
     assert call("run", tmp_path / "case.toml", "--no-plots", "--out", tmp_path / "run") == 0
     (found,) = json.loads((tmp_path / "run" / "run.json").read_text())["reduction"]["speeds"]
     assert found["speed_rpm"] == 45.0 and len(solves) == 4
+
+
+def test_modes_that_rigid_contact_takes_are_not_called_rigid_motions(tmp_path):
+    """A pair that cannot move when stuck leaves the reduced model one mode fewer than dofs, and none at 0 Hz."""
+    pad = 'name = "pad"\nlaw = "regularised_coulomb"\npairs = ["m23"]\nfriction_limit = 1.0\n'
+    contact = f"[[contact]]\n{pad}regularisation_velocity = 0.1\n"
+    (tmp_path / "case.toml").write_text(chain(False, "modes = 3", "") + contact)
+    assert call("run", tmp_path / "case.toml", "--no-plots", "--out", tmp_path / "run") == 0
+    found = json.loads((tmp_path / "run" / "run.json").read_text())["reduction"]
+    assert len(found["full_hz"]) == len(found["reduced_hz"]) == len(found["relative"]) == 3
+    assert "0 Hz" not in (tmp_path / "run" / "run.log").read_text()
