@@ -85,7 +85,7 @@ def test_a_damaged_file_is_refused_in_words(tmp_path: Path, capfd) -> None:
     case = put(tmp_path)
     (tmp_path / "K.tri").write_text("row column value\n1 1 none\n")
     assert call("check", case) == 2
-    assert "K.tri: could not convert string" in capfd.readouterr().err
+    assert "K.tri: ValueError: could not convert string" in capfd.readouterr().err
     with pytest.raises(InputError, match=r"the file of K cannot be read"):
         read_matrix(str(tmp_path / "K.tri"), "K")
 
@@ -104,3 +104,31 @@ def test_one_suffix_has_one_reader(tmp_path: Path) -> None:
         plugins.load_file(tmp_path / "other.py")
     with pytest.raises(InputError, match="it is no suffix"):
         formats.register_format("tri")
+
+
+RETURNED = {
+    "nothing": "None",
+    "two": "(A, A)",
+    "words": "A.astype(str)",
+    "flat": "A.ravel()",
+    "masked": "np.ma.masked_equal(A, -1e4)",
+}
+
+
+@pytest.mark.parametrize("name", RETURNED)
+def test_a_reader_that_returns_no_matrix_is_told_so(name: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """What stood behind a mask was taken, and the others were sent to the formats of the package."""
+    path = put(tmp_path)
+    text = TOY.read_text().replace("return coo_matrix(", "A = coo_matrix(")
+    (tmp_path / "toy_format.py").write_text(f"{text.rstrip()}.toarray()\n    return {RETURNED[name]}\n")
+    assert call("check", path) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "the reader of .tri files returned no matrix of numbers" in told and "correct the plug-in" in told
+
+
+def test_what_a_reader_raises_is_told_with_its_kind(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    path = put(tmp_path)
+    (tmp_path / "K.tri").write_text("heading\n1 x 2\n")
+    assert call("check", path) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "K.tri: ValueError: " in told and "write it again, or correct the plug-in" in told and "savez" not in told

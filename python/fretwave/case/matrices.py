@@ -87,13 +87,13 @@ def _read(path: Path, letter: str, where: str, key: KeyPath, notes: list[str]) -
         measured = f"{display(path)}: {error.measured or error.where}"
         raise InputError(error.what, where, measured, error.expected, error.fix) from None
     except Exception as error:  # whatever the readers raise on a damaged file
-        raise InputError(
-            f"the file of the {NAMES[letter]} cannot be read",
-            where=where,
-            measured=f"{display(path)}: {shortened(str(error) or type(error).__name__)}",
-            expected=f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx",
-            fix=_another_way(path, letter, key),
-        ) from None
+        expected = f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx"
+        told, fix = shortened(str(error) or type(error).__name__), _another_way(path, letter, key)
+        if _of_plugin(path):
+            expected, fix = f"a {path.suffix} file that its reader reads", "write it again, or correct the plug-in"
+            told = f"{type(error).__name__}: {shortened(str(error))}"
+        what = f"the file of the {NAMES[letter]} cannot be read"
+        raise InputError(what, where, f"{display(path)}: {told}", expected, fix) from None
     if np.iscomplexobj(sparse):
         raise InputError(
             f"the {NAMES[letter]} is complex",
@@ -102,6 +102,12 @@ def _read(path: Path, letter: str, where: str, key: KeyPath, notes: list[str]) -
             fix="put the imaginary part of a loss factor into C",
         )
     return sparse.astype(float)
+
+
+def _of_plugin(path: Path) -> bool:
+    from ..importers.formats import registered
+
+    return registered(path) is not None
 
 
 def _another_way(path: Path, letter: str, key: KeyPath) -> str:

@@ -8,9 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, TypeVar
 
+import numpy as np
+import scipy.sparse as sp
+
 from .. import registry
 from ..errors import InputError
 from ..files.isolated import call_isolated
+from ..given import masked
 from ..texts import display, names_beside, nearest
 from . import abaqus, ansys_full, calculix, matlab, matrix_market, nastran, npz, petsc_binary
 from .entries import Entries
@@ -116,10 +120,25 @@ def register_format(suffix: str) -> Callable[[Reader], Reader]:
     def register(reader: Reader) -> Reader:
         registry.admit(registry.FORMAT, suffix, _readers, reader)
         _readers[suffix] = reader
-        _registered[suffix] = Format(suffix, lambda head, path: path.suffix.lower() == suffix.lower(), reader)
+        _registered[suffix] = Format(suffix, lambda head, path: path.suffix.lower() == suffix.lower(), read)
         return reader
 
+    def read(path: Path, letter: str, variable: str | None) -> Any:
+        return _matrix(_readers[suffix](path, letter, variable), path, suffix)
+
     return register
+
+
+def _matrix(found: Any, path: Path, suffix: str) -> Any:
+    """What a registered reader gave, if it is a matrix of numbers."""
+    if isinstance(found, Entries):
+        return found
+    values = found if sp.issparse(found) else np.asanyarray(found)
+    if values.ndim != 2 or values.dtype.kind not in "biufc" or masked(values):
+        kind = "masked values" if masked(values) else f"{type(found).__name__}, {values.dtype.name} {values.shape}"
+        what, fix = f"the reader of {suffix} files returned no matrix of numbers", "correct the plug-in"
+        raise InputError(what, display(path), kind, "a dense or SciPy matrix, or fretwave.Entries", fix)
+    return values
 
 
 def forget_format(reader: Reader) -> None:
