@@ -54,7 +54,9 @@ def wear_areas(contacts: Sequence[Contact]) -> dict[str, Array]:
     if not found:
         given_laws = ", ".join(str(contact.law) for contact in contacts) or "no contact"
         fix = f'use law = "{law_like(lambda law: law.wears)}"'
-        raise InputError("no contact can wear", None, given_laws, "a law with a normal direction", fix)
+        raise InputError(
+            "no contact can wear", None, given_laws, "a compiled law of friction along a normal direction", fix
+        )
     return found
 
 

@@ -113,7 +113,9 @@ class WornMode(Destroyable):
         contact = self.model.contacts[names.index(name)]
         if not contact.info.wears:
             where, fix = f"contact '{name}'", f'use law = "{law_like(lambda law: law.wears)}"'
-            raise InputError("a contact cannot wear", where, contact.law, "a law with a normal direction", fix)
+            raise InputError(
+                "a contact cannot wear", where, contact.law, "a compiled law of friction along a normal direction", fix
+            )
 
     def _set_last(self, v: PETSc.Vec, value: float) -> None:
         local = v.getArray()
