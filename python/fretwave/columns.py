@@ -5,12 +5,14 @@ Units are those of quantities (:mod:`fretwave.units`); who writes or shows a tab
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Union
 
 import numpy as np
 
+from .errors import InputError
 from .units import SI, UnitSystem, quantity
 
 Value = Union[float, int, str]
@@ -19,6 +21,8 @@ Value = Union[float, int, str]
 PURE = ("", "1", "-")
 #: Longest event text kept in results.h5.
 EVENT_LENGTH = 48
+#: Column of a sweep's table: the number of the value.
+NUMBER = "value"
 
 
 @dataclass(frozen=True)
@@ -221,6 +225,23 @@ def with_discretisation(names: Sequence[Any]) -> list[Any]:
 def columns_named(names: Sequence[str | Column], units: UnitSystem = SI) -> list[Column]:
     """Columns by name; an analysis may bring columns of its own."""
     return [(name if isinstance(name, Column) else COLUMNS[name]).in_units(units) for name in names]
+
+
+def check_names(columns: Sequence[Column], where: str) -> None:
+    """Columns of a table can stand beside each other, and beside the numbers of a sweep's values.
+
+    Raises
+    ------
+    InputError
+    """
+    names = [column.name for column in columns]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError("two columns of a table have one name", where, twice, "each name once", "rename one of them")
+    wrong = next((name for name in names if name == NUMBER or not re.fullmatch(r"\w+", name)), None)
+    if wrong is not None:
+        expected = f"letters, digits and _, and not '{NUMBER}', which numbers the values of a sweep"
+        raise InputError("a column of a table cannot have this name", where, repr(wrong), expected, "rename the column")
 
 
 #: Of tables beside those of the analyses.

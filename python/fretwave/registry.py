@@ -82,6 +82,9 @@ def admit(what: str, name: str, known: Mapping[str, Any], new: type | Callable[.
     if name in known and file_of(known[name]) != file_of(new):
         places = f"{file_of(known[name])} and {file_of(new)}"
         raise InputError(f"two files register a {what} '{name}'", file_of(new), places, "each name once", "rename one")
+    if any(one is known.get(name) is not new for added in _noting for _, one in added):
+        what = f"the file registers a {what} '{name}' twice"
+        raise InputError(what, file_of(new), name, "each name once", "rename or remove one")
     if new.__module__.partition(".")[0] == __package__:
         return  # the package's own stay, whoever asked for them first
     for added in _noting:

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..columns import Column, Value, columns_named
+from ..columns import Column, Value, check_names, columns_named
+from ..errors import InputError
 from ..files.csv_table import header_line, row_line
 from ..files.whole import replace_bytes, told, write_all
 from ..mpi.spread import Spread, send_parts
@@ -84,6 +85,7 @@ class AnalysisWriter:
         self.folder, self.name, self.active = folder, name, active
         self.attributes, self.units = dict(attributes), units_of(attributes)
         self.columns = columns_named(columns, self.units)
+        check_names(self.columns, f"analysis '{name}'")
         self.rows = 0
         self.reported = 0
         self.publish_later = publish_later
@@ -178,13 +180,22 @@ class AnalysisWriter:
             f"field/{name}": np.asarray((fields or {})[name], dtype=float) for name in self.fields
         }
         if coefficients is not None and self._labels:
-            spread = isinstance(coefficients, Spread)
-            arrays["coefficients"] = coefficients if spread else np.asarray(coefficients, dtype=float)
+            spread, shape = isinstance(coefficients, Spread), (len(self._dofs), len(labels or self._labels))
+            arrays["coefficients"] = coefficients if spread else self._fitting(coefficients, shape)
             if len(labels) > len(self._labels):
                 values[LABELS] = list(labels)
         for contact, motion in (motions or {}).items():
             arrays.update({f"motion/{contact}/{key}": values for key, values in _kept(motion)})
         return Record("row", values, arrays)
+
+    def _fitting(self, coefficients: Any, shape: tuple[int, int]) -> npt.NDArray[Any]:
+        """Coefficients as an array that has a row for each dof and a column for each label, or fewer."""
+        found = np.asarray(coefficients)
+        if found.shape[:1] != shape[:1] or found.ndim != 2 or found.shape[1] > shape[1] or np.iscomplexobj(found):
+            measured, where = f"{found.dtype.name} {found.shape}", f"analysis '{self.name}'"
+            fix = "give one row a dof and one column a label, of cosines and sines"
+            raise InputError("coefficients do not fit the table", where, measured, f"real {shape}", fix)
+        return found.astype(float)
 
     def _write(self, record: Record, line: str) -> None:
         """A row to the journal, then to the CSV; the first one starts both."""
@@ -232,6 +243,11 @@ class AnalysisWriter:
         self._journal.append(Record("array", {"name": name, "attributes": attributes}, {"values": values}))
         if self._new is not None:
             self._new.array(self.name, name, values, in_units(attributes, self.units))
+
+    @property
+    def closed(self) -> bool:
+        """Its end has been told, on the writing rank."""
+        return self._ending is not None
 
     def close(self, status: str, reason: str, **attributes: Value) -> None:
         """End the table; `status` is ``done`` or ``stopped``. Without any row nothing is written."""

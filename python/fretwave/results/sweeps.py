@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import AnyArray
-from ..columns import Column, table_order
+from ..columns import NUMBER, Column, table_order
 from ..files.csv_table import plain, write_columns, write_rows
 from ..files.dimensions import name_dimensions
 from ..post.grid import Plan
@@ -241,7 +241,7 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
     numbers = np.repeat(np.array([branch.number for branch in branches], dtype="i8"), lengths)
     system = system_of(branches)
     columns = [(key_column(plan, key, system), _key_column(plan, key)[numbers]) for key in plan.keys]
-    columns.append((Column("value", "1", "number of the combination of values", "i"), numbers))
+    columns.append((Column(NUMBER, "1", "number of the combination of values", "i"), numbers))
     for key in table_order(dict.fromkeys(key for branch in branches for key in branch.table)):
         first = next(branch for branch in branches if key in branch.table)
         unit, long_name = first.units[key]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..analyses.parts.context import AnalysisContext, Outcome
+from ..analyses.parts.context import AnalysisContext, Outcome, outcome_of
 from ..case import checks
 from ..case.analysis import AnalysisSection
 from ..case.build import model_of
@@ -314,7 +314,7 @@ class Runner:
                 },
             )
             try:
-                outcome = analysis.run(context)
+                outcome = outcome_of(analysis, analysis.run(context))
             except NotConverged as error:  # before its first point: there was no static state to start from
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
@@ -331,7 +331,7 @@ class Runner:
         if outcome.points and not self.part:
             with event("FwCurve"):
                 context.write_curves()
-        context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
+        context.publish(outcome)  # last of all: from here on a resumed run leaves the analysis as it is
 
     def _sweep(self, name: str, sweep: Sweep) -> None:
         """Run another analysis for every value, on groups of ranks."""

@@ -23,6 +23,7 @@ from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
 from ...mpi.petsc_share import prefix_of
 from ...post.mode_curve import ModeCurve
+from ...registry import file_of
 from ...results.analysis import own_curve
 from ...results.reader import write_curve
 from ...results.results import AnalysisWriter, Field, open_results
@@ -67,6 +68,21 @@ class Outcome:
     summary: list[str] = field(default_factory=list)
     goal: str = ""
     advice: str = ""
+
+
+def outcome_of(analysis: AnalysisSection, found: object) -> Outcome:
+    """What an analysis has returned.
+
+    Raises
+    ------
+    InputError
+        It is no outcome.
+    """
+    if not isinstance(found, Outcome):
+        what, where = f"`run` of the analysis '{analysis.name}' returned no outcome", file_of(type(analysis))
+        fix = 'return for example fw.Outcome(writer.rows, "all points", True)'
+        raise InputError(what, where, type(found).__name__, "a fretwave.Outcome", fix)
+    return found
 
 
 @dataclass
@@ -203,11 +219,16 @@ class AnalysisContext(Generic[Section]):
 
         on_first_rank(self.comm, write)
 
-    def publish(self) -> None:
-        """The analysis is done, with all its tables: its results take their place. Collective."""
+    def publish(self, outcome: Outcome) -> None:
+        """The analysis is done, with all its tables: its results take their place. Collective.
+
+        A table that the analysis has not closed ends as the analysis did.
+        """
 
         def finish() -> None:
             for writer in self.writers:
+                if not writer.closed:
+                    writer.close("done" if outcome.converged else "stopped", outcome.reason)
                 writer.publish()
             for work in self.afterwards:
                 work()
