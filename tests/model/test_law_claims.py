@@ -236,6 +236,11 @@ def test_where_differences_are_no_tangents_they_are_not_held_to_them() -> None:
     assert Corner(u, v)._evaluate(u, v)[2] == pytest.approx(1e9)
 
 
+@pytest.mark.parametrize("shape", [(16, 2, 0), (0, 2, 5)], ids=["pairs", "samples"])
+def test_where_nothing_moves_there_is_nothing_to_hold_a_law_to(shape: tuple[int, ...]) -> None:
+    assert Cubic()._evaluate(np.ones(shape), np.ones(shape))[0].shape == shape
+
+
 @pytest.mark.parametrize("name", ["gap", "odd", "pairs", "stuck_stiffness"])
 def test_a_parameter_does_not_hide_what_laws_have(name: str) -> None:
     """One of the name `pairs` was the numbers of the pairs, one of the name `gap` the method's place."""
