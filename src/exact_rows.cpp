@@ -14,15 +14,16 @@ namespace {
 constexpr int width = 4, most = 4;  // registers of AVX2, as in blocked_product.cpp: half of them hold sums
 using Register = double __attribute__((vector_size(width * sizeof(double))));
 
-/// What `sum`, the rounded a + b, is short of (Knuth).
+/// Adds what `sum`, the rounded a + b, is short of (Knuth).
 template <class Real>
-FRETWAVE_INLINE Real short_of(Real const& a, Real const& b, Real const& sum) {
+FRETWAVE_INLINE void add_rest_of_sum(Real const& a, Real const& b, Real const& sum, Real& out) {
   const Real of_b = sum - a;
-  return (a - (sum - of_b)) + (b - of_b);
+  out += (a - (sum - of_b)) + (b - of_b);
 }
 
-/// What `product`, the rounded a b, is short of.
-FRETWAVE_INLINE void add_short_of(double a, Register const& b, Register const& product, Register& out) {
+/// Adds what `product`, the rounded a b, is short of.
+FRETWAVE_INLINE void add_rest_of_product(double a, Register const& b, Register const& product,
+                                         Register& out) {
   for (int i = 0; i < width; ++i) out[i] += std::fma(a, b[i], -product[i]);
 }
 
@@ -39,15 +40,16 @@ FRETWAVE_INLINE void multiply(SparseRows const& A, double const* x, double* y, d
         std::memcpy(&in, of_dof + r * width, sizeof in);
         const Register product = A.value[k] * in, before = sum[r];
         sum[r] += product;
-        left[r] += short_of(before, product, sum[r]);
-        add_short_of(A.value[k], in, product, left[r]);
+        add_rest_of_sum(before, product, sum[r], left[r]);
+        add_rest_of_product(A.value[k], in, product, left[r]);
       }
     }
     for (int i = 0; i < coefficients; ++i) {
-      const double before = y[i], more = sum[i / width][i % width], high = before + more,
-                   below = low[i] + left[i / width][i % width] + short_of(before, more, high);
-      y[i] = high + below;
-      low[i] = short_of(high, below, y[i]);
+      const double before = y[i], more = sum[i / width][i % width], high = before + more;
+      double below = low[i] + left[i / width][i % width];
+      add_rest_of_sum(before, more, high, below);
+      y[i] = high + below, low[i] = 0;
+      add_rest_of_sum(high, below, y[i], low[i]);
     }
   }
 }
