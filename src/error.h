@@ -29,4 +29,9 @@ struct RankFailure : std::runtime_error {
   std::string where, fix;
 };
 
+/// Someone wants the work to end. Becomes KeyboardInterrupt in Python.
+struct Interrupted : std::runtime_error {
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
 }  // namespace fretwave

@@ -9,7 +9,7 @@ namespace fretwave {
 
 namespace {
 
-enum class Kind : int { other, memory, input, singular, petsc };
+enum class Kind : int { other, memory, input, singular, petsc, interrupt };
 
 /// An exception as it goes from one rank to the others: its kind and its texts, each ended by a zero.
 struct Message {
@@ -28,7 +28,7 @@ struct Message {
   }
 };
 
-std::optional<InputError> (*input_error_of)(std::exception const&) = nullptr;
+void (*read_foreign)(std::exception const&) = nullptr;
 
 /// What an exception says, and where: one of Python has a traceback before its words, of which the last line
 /// tells the place.
@@ -50,6 +50,21 @@ Message message_of(InputError const& e) {
   return out;
 }
 
+Message message_of(std::exception_ptr const& failure);
+
+/// Of an exception that is none of the core's own.
+Message message_of_other(std::exception const& e) {
+  try {
+    if (read_foreign) read_foreign(e);
+  } catch (...) {
+    return message_of(std::current_exception());
+  }
+  Message out;
+  auto const [words, place] = words_and_place(e.what());
+  out.add(words), out.add(place);
+  return out;
+}
+
 Message message_of(std::exception_ptr const& failure) {
   Message out;
   try {
@@ -62,11 +77,10 @@ Message message_of(std::exception_ptr const& failure) {
     out.kind = Kind::petsc, out.add(e.what());
   } catch (std::bad_alloc const&) {
     out.kind = Kind::memory;
+  } catch (Interrupted const&) {
+    out.kind = Kind::interrupt;
   } catch (std::exception const& e) {
-    if (input_error_of)
-      if (auto const input = input_error_of(e)) return message_of(*input);
-    auto const [words, place] = words_and_place(e.what());
-    out.add(words), out.add(place);
+    return message_of_other(e);
   } catch (...) {
     out.add("an exception without words"), out.add("");
   }
@@ -88,6 +102,8 @@ Message message_of(std::exception_ptr const& failure) {
     case Kind::memory:
       throw RankFailure("there is not enough memory", where,
                         "use more ranks on more machines, fewer harmonics or a reduced model");
+    case Kind::interrupt:
+      throw Interrupted();
     case Kind::other:
       break;
   }
@@ -98,9 +114,7 @@ Message message_of(std::exception_ptr const& failure) {
 
 }  // namespace
 
-void read_input_errors_by(std::optional<InputError> (*reader)(std::exception const&)) {
-  input_error_of = reader;
-}
+void read_foreign_errors_by(void (*reader)(std::exception const&)) { read_foreign = reader; }
 
 void agree(MPI_Comm comm, char const* task, std::exception_ptr failure) {
   const int rank = comm_rank(comm), ranks = comm_size(comm);

@@ -1,14 +1,14 @@
 #pragma once
 #include <exception>
-#include <optional>
 
 #include "error.h"
 #include "petsc.h"
 
 namespace fretwave {
 
-/// What finds the core's InputError in an exception of a language around it. For the whole process.
-void read_input_errors_by(std::optional<InputError> (*)(std::exception const&));
+/// What throws the core's own error in place of an exception of a language around it, where there is one (an
+/// InputError, Interrupted), and else returns. For the whole process.
+void read_foreign_errors_by(void (*)(std::exception const&));
 
 /// Every rank throws what the first rank that failed has caught, in its words; returns if none has.
 /// Collective.

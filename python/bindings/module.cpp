@@ -35,6 +35,8 @@ void translate(std::exception_ptr const& pointer, void*) {
   } catch (InputError const& e) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("InputError");
     raise("InputError", type(e.what(), text(e.where), text(e.measured), text(e.expected), text(e.fix)));
+  } catch (Interrupted const&) {
+    PyErr_SetNone(PyExc_KeyboardInterrupt);
   } catch (RankFailure const& e) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
     raise("FretwaveError", type(e.what(), text(e.where), nb::none(), nb::none(), text(e.fix)));
@@ -47,15 +49,17 @@ void translate(std::exception_ptr const& pointer, void*) {
   }
 }
 
-/// An InputError of a law in Python as the core's, which goes over to other ranks whole.
-std::optional<InputError> input_error_of(std::exception const& error) {
+/// An interrupt, or an InputError, of a law in Python as the core's, which goes over to other ranks whole.
+void read_foreign_error(std::exception const& error) {
   auto const* python = dynamic_cast<nb::python_error const*>(&error);
-  if (!python || !python->matches(nb::module_::import_("fretwave.errors").attr("InputError"))) return {};
+  if (!python) return;
+  if (python->matches(PyExc_KeyboardInterrupt)) throw Interrupted();
+  if (!python->matches(nb::module_::import_("fretwave.errors").attr("InputError"))) return;
   const auto said = [&](char const* name) {
     const nb::object value = python->value().attr(name);
     return value.is_none() ? std::string() : std::string(nb::str(value).c_str());
   };
-  return InputError(said("what"), said("measured"), said("expected"), said("fix"), said("where"));
+  throw InputError(said("what"), said("measured"), said("expected"), said("fix"), said("where"));
 }
 
 /// Options given but read by nothing: most often misspelt.
@@ -119,7 +123,7 @@ NB_MODULE(_core, m) {
   precondition::register_kinds();
   fault::arm_from(std::getenv("FRETWAVE_FAULT"), comm_rank(PETSC_COMM_WORLD));
   nb::register_exception_translator(translate);
-  read_input_errors_by(input_error_of);
+  read_foreign_errors_by(read_foreign_error);
   // a script's model holds its law in Python, whose functions hold the script: at its end none is freed
   nb::set_leak_warnings(false);
   m.doc() = "C++ core of fretwave; use the package's own classes";
