@@ -23,10 +23,7 @@ class PythonLaw : public contact::Law {
   double stuck_stiffness(int, int) const override { return stuck_stiffness_; }
 
   void force(contact::Motion const& motion, double* f, contact::Record& record) const override {
-    const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components),
-                                       size_t(motion.pairs)};
-    nb::tuple out =
-        nb::cast<nb::tuple>(law_.attr("_evaluate")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape)));
+    nb::tuple out = nb::cast<nb::tuple>(asked("_evaluate", motion));
     take(out[0], motion.size(), f);
     record.df_du.resize(motion.size() * motion.components);
     record.df_dv.resize(motion.size() * motion.components);
@@ -34,12 +31,13 @@ class PythonLaw : public contact::Law {
     take(out[2], record.df_dv.size(), record.df_dv.data());
   }
 
+  void force_alone(contact::Motion const& motion, double* f, contact::Record&) const override {
+    take(asked("_force_alone", motion), motion.size(), f);
+  }
+
   void diagnose(contact::Motion const& motion, double const* f, contact::Diagnosis& out) const override {
     contact::add_work(motion, f, out.work);
-    const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components),
-                                       size_t(motion.pairs)};
-    nb::tuple states = nb::cast<nb::tuple>(
-        law_.attr("_states")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape), numpy_copy(f, shape)));
+    nb::tuple states = nb::cast<nb::tuple>(asked("_states", motion, numpy_copy(f, shape_of(motion))));
     std::vector<double> status(out.status.size()), gap(out.status.size());
     take(states[0], status.size(), status.data());
     take(states[1], gap.size(), gap.data());
@@ -52,6 +50,14 @@ class PythonLaw : public contact::Law {
   }
 
  private:
+  static std::vector<size_t> shape_of(contact::Motion const& motion) {
+    return {size_t(motion.samples), size_t(motion.components), size_t(motion.pairs)};
+  }
+  template <class... More>
+  nb::object asked(char const* method, contact::Motion const& motion, More... more) const {
+    const auto shape = shape_of(motion);
+    return law_.attr(method)(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape), more...);
+  }
   static void take(nb::handle from, size_t size, double* to) {
     auto array = nb::cast<nb::ndarray<double const, nb::c_contig, nb::device::cpu>>(from);
     if (array.size() != size) throw nb::value_error("a law in Python returned an array of the wrong size");

@@ -150,6 +150,10 @@ class Law {
 
   /// Force on the pairs, and what its linearisation needs.
   virtual void force(Motion const&, double* f, Record&) const;
+  /// The force where no linearisation follows; the record is left in any state.
+  virtual void force_alone(Motion const& motion, double* f, Record& record) const {
+    force(motion, f, record);
+  }
   /// Linearised force for a motion perturbed by (du, dv), null where the law ignores it. Of the motion only
   /// the sizes are read here and in what follows but `diagnose`: the rest is in the record.
   virtual void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const;

@@ -38,7 +38,7 @@ std::vector<Transient::Seen> Transient::see(Vec state) {
     auto const& contact = model_.contacts()[i];
     if (!contact.law->uses_displacement()) continue;
     Tangents& at = tangents_[i];
-    meet(contact, at);
+    meet(contact, at, true);
     out[i] = {at.displacement, at.velocity, at.force, at.record.df_du};
   }
   return out;
@@ -46,17 +46,25 @@ std::vector<Transient::Seen> Transient::see(Vec state) {
 
 namespace {
 
-/// A contact at rest where a component of each pair turns within the step; where it does not, at its begin.
+/// The share of the step in which a component of each pair turns, for the first or the second time; 0 where
+/// it does not.
+std::vector<double> shares_of_turns(Transient::Seen const& one, Transient::Seen const& other, double h,
+                                    size_t n, size_t component, size_t which) {
+  std::vector<double> out(n);
+  for (size_t i = 0; i < n; ++i) {
+    const size_t k = component * n + i;
+    out[i] = turns(one.u[k], other.u[k], h * one.v[k], h * other.v[k])[which];
+  }
+  return out;
+}
+
+/// A contact at rest at a share of the step for each pair.
 Transient::Seen at_turn(contact::Law const& law, Transient::Seen const& one, Transient::Seen const& other,
-                        double h, size_t component, size_t which) {
+                        double h, std::vector<double> const& shares) {
   const size_t d = law.components(), n = law.pairs();
   Transient::Seen out{one.u, std::vector<double>(d * n, 0.0), std::vector<double>(d * n), {}};
-  for (size_t i = 0; i < n; ++i) {
-    const size_t turning = component * n + i;
-    const double s = turns(one.u[turning], other.u[turning], h * one.v[turning], h * other.v[turning])[which];
-    for (size_t k = i; k < d * n; k += n)
-      out.u[k] = cubic(s, one.u[k], other.u[k], h * one.v[k], h * other.v[k]);
-  }
+  for (size_t k = 0; k < d * n; ++k)
+    out.u[k] = cubic(shares[k % n], one.u[k], other.u[k], h * one.v[k], h * other.v[k]);
   contact::Record record;
   law.force(
       {.samples = 1, .components = int(d), .pairs = int(n), .u = out.u.data(), .v = out.v.data(), .step = 0},
@@ -88,7 +96,9 @@ bool passes_kink(contact::Law const& law, Transient::Seen const& one, Transient:
   if (one.tangent.size() != d * d * n || other.tangent.size() != d * d * n) return false;
   for (size_t turn = 0; turn < 2 * d; ++turn) {
     const size_t component = turn / 2;
-    const auto here = at_turn(law, one, other, h, component, turn % 2);
+    const auto shares = shares_of_turns(one, other, h, n, component, turn % 2);
+    if (std::ranges::all_of(shares, [](double share) { return share == 0; })) continue;
+    const auto here = at_turn(law, one, other, h, shares);
     if (here.tangent.size() != d * d * n) continue;
     for (size_t i = 0; i < n; ++i)
       if (std::min(behind(here, one, d, n, component, i), behind(here, other, d, n, component, i)) > allowed)

@@ -341,7 +341,7 @@ History Transient::integrate(Vec x0, Vec v0, double tolerance, bool implicit) {
     std::copy_n(ReadArray(v0).data(), n, out.data() + n);
   }
   begun_ = see(state);
-  forces(0, state);  // the contacts' tangents say which entries the Jacobian has
+  forces(0, state, true);  // the contacts' tangents say which entries the Jacobian has
   TsHandle ts;
   check(TSCreate(model_.comm(), ts.out()));
   set_up(ts, state, tolerance, implicit);

@@ -68,10 +68,10 @@ class Transient {
   void use_explicit(TS);
   void use_implicit(TS);
   void resolve_sticking(double tolerance, double size, Vec allowed);
-  void forces(double t, Vec state);
+  void forces(double t, Vec state, bool tangents);
   void place(Vec state);
-  void meet(model::Contact const&, Tangents&);
-  void contact_force(model::Contact const&, Tangents&, Vec force);
+  void meet(model::Contact const&, Tangents&, bool tangents);
+  void contact_force(model::Contact const&, Tangents&, Vec force, bool tangents);
   void solve_mass(Vec force, Vec acceleration);
   void prepare_jacobian();
   void assemble(double shift, Mat A);

@@ -24,24 +24,26 @@ void Transient::place(Vec state) {
   std::copy_n(in.data() + n, n, v.data());
 }
 
-/// What a contact does at x_ and v_, with its law's tangents.
-void Transient::meet(model::Contact const& contact, Tangents& at) {
+/// What a contact does at x_ and v_; its law's tangents are those of the last state that asked for them, or
+/// none.
+void Transient::meet(model::Contact const& contact, Tangents& at, bool tangents) {
   check(MatMult(contact.B, x_, at.u));
   check(MatMult(contact.B, v_, at.v));
   const int d = contact.law->components(), n = contact.law->pairs();
   pairs_innermost(ReadArray(at.u).data(), d, n, at.displacement);
   pairs_innermost(ReadArray(at.v).data(), d, n, at.velocity);
-  contact.law->force({.samples = 1,
-                      .components = d,
-                      .pairs = n,
-                      .u = at.displacement.data(),
-                      .v = at.velocity.data(),
-                      .step = 0},
-                     at.force.data(), at.record);
+  const contact::Motion motion = {.samples = 1,
+                                  .components = d,
+                                  .pairs = n,
+                                  .u = at.displacement.data(),
+                                  .v = at.velocity.data(),
+                                  .step = 0};
+  if (tangents) return contact.law->force(motion, at.force.data(), at.record);
+  contact.law->force_alone(motion, at.force.data(), at.record);
 }
 
-void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec force) {
-  meet(contact, at);
+void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec force, bool tangents) {
+  meet(contact, at, tangents);
   const int d = contact.law->components(), n = contact.law->pairs();
   {
     WriteArray rows(at.f);
@@ -51,12 +53,14 @@ void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec f
   check(MatMultTransposeAdd(contact.B, at.f, force, force));
 }
 
-/// force_ = C v + K x + B^T f - p, with x_, v_ and the contacts' tangents at the state.
-void Transient::forces(double t, Vec state) {
+/// force_ = C v + K x + B^T f - p, with x_, v_ and, where they are asked for, the contacts' tangents at the
+/// state.
+void Transient::forces(double t, Vec state, bool tangents) {
   place(state);
   check(MatMult(K_, x_, force_));
   if (C_) check(MatMultAdd(C_, v_, force_, force_));
-  for (size_t i = 0; i < tangents_.size(); ++i) contact_force(model_.contacts()[i], tangents_[i], force_);
+  for (size_t i = 0; i < tangents_.size(); ++i)
+    contact_force(model_.contacts()[i], tangents_[i], force_, tangents);
   for (auto const& part : excitation_) {
     check(VecAXPY(force_, -std::cos(part.order * omega_ * t), part.cosine));
     check(VecAXPY(force_, -std::sin(part.order * omega_ * t), part.sine));
@@ -77,7 +81,7 @@ void Transient::solve_mass(Vec force, Vec acceleration) {
 PetscErrorCode Transient::right_side(TS, PetscReal t, Vec state, Vec rate, void* context) {
   auto& self = *static_cast<Transient*>(context);
   return self.guard_.run([&] {
-    self.forces(t, state);
+    self.forces(t, state, false);
     self.solve_mass(self.force_, self.acceleration_);
     const PetscInt n = self.model_.local_dofs();
     ReadArray v(self.v_), a(self.acceleration_);
@@ -91,7 +95,7 @@ PetscErrorCode Transient::right_side(TS, PetscReal t, Vec state, Vec rate, void*
 PetscErrorCode Transient::residual(TS, PetscReal t, Vec state, Vec rate, Vec out, void* context) {
   auto& self = *static_cast<Transient*>(context);
   return self.guard_.run([&] {
-    self.forces(t, state);
+    self.forces(t, state, false);
     const PetscInt n = self.model_.local_dofs();
     {
       ReadArray in(rate);
@@ -109,7 +113,7 @@ PetscErrorCode Transient::jacobian(TS, PetscReal t, Vec state, Vec, PetscReal sh
                                    void* context) {
   auto& self = *static_cast<Transient*>(context);
   return self.guard_.run([&] {
-    self.forces(t, state);
+    self.forces(t, state, true);
     check(MatZeroEntries(A));
     self.assemble(shift, A);
   });

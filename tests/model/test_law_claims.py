@@ -149,6 +149,42 @@ def test_other_ranks_are_told_what_a_law_raises_and_where() -> None:
     assert error.value.where is not None and f'rank 0, contact forces, File "{__file__}", line' in error.value.where
 
 
+class Interrupting(Cubic):
+    def force(self, u: Any, v: Any) -> Any:
+        if u.shape[2] != 2:  # on the first rank alone, or the only one
+            raise KeyboardInterrupt
+        return super().force(u, v)
+
+
+@pytest.mark.ranks(1, 2)
+def test_an_interrupt_in_a_law_interrupts_all_ranks() -> None:
+    """It came out as an error of the law."""
+    with pytest.raises(KeyboardInterrupt):
+        followed(Interrupting())
+
+
+class Counting(Cubic):
+    asked = {"force": 0, "tangent": 0}
+
+    def force(self, u: Any, v: Any) -> Any:
+        self.asked["force"] += 1
+        return super().force(u, v)
+
+    def tangent(self, u: Any, v: Any) -> Any:
+        self.asked["tangent"] += 1
+        return super().tangent(u, v)
+
+
+def test_an_explicit_step_in_time_asks_for_forces_alone() -> None:
+    """And for tangents once, where it looks for corners; they were asked for as often as forces."""
+    model = fw.Model(np.eye(2), np.eye(2), None, [fw.Contact(Counting(), np.eye(2))])
+    Counting.asked.update(force=0, tangent=0)
+    run = fw.Transient(model).run([1.0, 0.5], [0.0, 0.0], 20.0, 0.5, 1e-6)
+    energy = [0.5 * (v @ v + x @ x) + 0.125 * (x**4).sum() for x, v in zip(run["x"], run["v"])]
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-4)
+    assert 0 < Counting.asked["tangent"] < 0.5 * Counting.asked["force"], Counting.asked
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [("normal", 5), ("odd", "no"), ("odd", 1), ("stuck_stiffness", np.nan), ("stuck_stiffness", None)],

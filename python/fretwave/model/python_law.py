@@ -119,14 +119,25 @@ class PythonLaw:
             yield from np.split(self._force(*(np.concatenate(parts) for parts in zip(*several))), len(several))
 
     def _evaluate(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
-        """What the compiled core calls for the force."""
+        """What the compiled core calls for the force and its tangents."""
         f, tangents = self._force(*_copies(u, v)), self._tangents(u, v)
-        self._evaluations += 1
-        if self._evaluations & (self._evaluations - 1) == 0:  # 1, 2, 4, 8, ...
+        if self._is_due():
             check_motion(self, u, v, f)
             if type(self).tangent is not PythonLaw.tangent:
                 check_tangents(self, u, v, f, tangents)
         return f, *tangents
+
+    def _force_alone(self, u: Array, v: Array) -> Array:
+        """And where it needs no tangents."""
+        f = self._force(*_copies(u, v))
+        if self._is_due():
+            check_motion(self, u, v, f)
+        return f
+
+    def _is_due(self) -> bool:
+        """Whether the law is held to its word at this evaluation: at 1, 2, 4, 8, ..."""
+        self._evaluations += 1
+        return self._evaluations & (self._evaluations - 1) == 0
 
     def _force(self, u: Array, v: Array) -> Array:
         return np.array(
