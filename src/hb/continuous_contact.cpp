@@ -1,6 +1,7 @@
 #include "hb/continuous_contact.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "hb/indicator.h"
 
@@ -14,6 +15,13 @@ constexpr int tile = 32;  // pairs whose times fit the cache
 Series sum(Series a, double factor, Series const& b) {
   for (size_t k = 0; k < a.q.size(); ++k) a.q[k] += factor * b.q[k];
   return a;
+}
+
+/// It is nowhere farther from its mean than that.
+double swing(Series const& p) {
+  double out = 0;
+  for (size_t k = 1; k < p.q.size(); ++k) out += std::abs(p.q[k].real()) + std::abs(p.q[k].imag());
+  return out;
 }
 
 }  // namespace
@@ -88,7 +96,8 @@ void ContinuousContact::find_spans(Pair& pair, int place) {
   pair.normal.find_spans(wave_.data(), N);
 }
 
-/// Walls u -+ R with R = (limit + mu N) / kt, about the mean of u, and the play between them.
+/// Walls u -+ R with R = (limit + mu N) / kt, about the mean of u, and the play between them: where they turn
+/// is looked for only if they can come to the slider.
 void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
   Tangent& now = pair.tangents[tangent];
   contact::LinearPair const& law = pair.law;
@@ -98,6 +107,10 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
   if (reach > 0) now.walls.radius = sum(now.walls.radius, reach, pair.normal.approach);
   now.play.clear();
   if (!law.rubs() || !pair.normal.touches()) return;
+  const double rest = law.slider[tangent] - now.mean;
+  if (pair.normal.closed &&
+      std::abs(rest) + swing(now.u) + swing(now.walls.radius) < now.walls.radius.q[0].real())
+    return now.play.stand(rest);
   now.walls.lower = sum(now.u, -1, now.walls.radius), now.walls.upper = sum(now.u, 1, now.walls.radius);
   const int N = times_.samples(), step = components_ * tile_;
   double const* rates = grid_.rates.data() + place;
@@ -116,7 +129,7 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
     find_roots(now.walls.wall(side), 1, wave_.data(), N, turns);
   }
   if (pair.normal.closed)
-    now.play.close(now.walls, law.slider[tangent] - now.mean);
+    now.play.close(now.walls, rest);
   else
     now.play.close(now.walls, pair.normal.spans);
 }

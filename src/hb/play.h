@@ -33,6 +33,11 @@ class Play {
   bool stuck = false;  ///< all the period: one stick
 
   void clear() { sticks.clear(), slips.clear(), stuck = false; }
+  /// Always closed, and the slider at `rest` out of the walls' reach.
+  void stand(double rest) {
+    clear();
+    stuck = true, sticks = {{0, period, 0, rest, false}};
+  }
   /// Always closed, from a slider at `rest` (about the mean of u): the closed period that it ends in.
   void close(Walls const&, double rest);
   /// Closed in these spans.
