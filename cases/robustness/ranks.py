@@ -37,7 +37,7 @@ SAME = 1e-8
 #: Four digits are enough of an estimate, and where it is solved by iteration they are other ones on other ranks.
 EXACT = "petsc=-error_tangent_ksp_rtol 1e-12 -error_tangent_ksp_max_it 2000"
 ITERATED = {
-    "blade_root": ["mode", "mode_epmc"],
+    "blade_root": ["mode", "mode_epmc", "wear", "wear_profile"],
     "blade_root_retained": ["mode"],
     "blisk_lumped": ["forced_mistuned", "mode_mistuned", "mode_wheel"],
     "blisk_ring": ["flutter", "forced", "mode", "mode_wheel"],

@@ -57,6 +57,7 @@ WRONG = {
     "complex": ({"coefficients": "1j * np.ones((2, 2))"}, "coefficients do not fit the table"),
     "twice": ({"names": ["one", "one"]}, "two columns of a table have one name"),
     "number": ({"names": ["one", "value"]}, "a column of a table cannot have this name"),
+    "second": ({"close": 'context.writer(["amplitude"])'}, "the analysis 'x' asks for a second table"),
     "folder": ({"names": ["one/two"]}, "a column of a table cannot have this name"),
 }
 
@@ -76,7 +77,7 @@ def write(folder, **given):
 
 @pytest.mark.parametrize("name", WRONG)
 def test_what_does_not_fit_is_refused(name, tmp_path, capsys):
-    """One row of coefficients stood for all dofs, complex ones lost their imaginary part; the others were defects."""
+    """One row of coefficients would stand for all dofs, complex ones lose their imaginary part."""
     given, words = WRONG[name]
     assert call("run", write(tmp_path, **given), "--no-plots") == 2
     assert words in capsys.readouterr().err
@@ -91,7 +92,7 @@ def test_what_fits_is_taken_also_in_a_sweep(tmp_path):
 
 @pytest.mark.parametrize("converged", [True, False], ids=["done", "stopped"])
 def test_a_table_that_is_not_closed_ends_as_the_analysis_does(converged, tmp_path):
-    """The run was done, and its results for ever running."""
+    """And not as one that is still running."""
     outcome = f'fw.Outcome(1, "all", {converged})'
     assert call("run", write(tmp_path, close="pass", outcome=outcome), "--no-plots", "--out", tmp_path / "run") in (
         0,
@@ -120,7 +121,7 @@ def {name}(path, letter, variable):
 
 @pytest.mark.parametrize("kind", ["analysis", "law", "reader"])
 def test_a_file_that_registers_a_name_twice_is_refused(kind, tmp_path, capsys):
-    """The last one of the name was taken without a word."""
+    """One of them would be taken without a word."""
     path = write(tmp_path)
     text = (tmp_path / "own.py").read_text()
     analysis = text[text.index("@fw") :].replace("class Own", "class Other")

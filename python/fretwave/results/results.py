@@ -96,6 +96,7 @@ class AnalysisWriter:
         self._journal = Journal(folder, name)
         self._table = -1
         self._ending: dict[str, Any] | None = None
+        self.closed = False  #: its end has been told, on the writing rank
         self._new: NewResults | None = None
 
     @property
@@ -244,16 +245,11 @@ class AnalysisWriter:
         if self._new is not None:
             self._new.array(self.name, name, values, in_units(attributes, self.units))
 
-    @property
-    def closed(self) -> bool:
-        """Its end has been told, on the writing rank."""
-        return self._ending is not None
-
     def close(self, status: str, reason: str, **attributes: Value) -> None:
         """End the table; `status` is ``done`` or ``stopped``. Without any row nothing is written."""
         if not self.active or not self.rows:
             return
-        self._ending = {**attributes, "status": status, "reason": reason}
+        self._ending, self.closed = {**attributes, "status": status, "reason": reason}, True
         if not self.publish_later:
             self.publish()
 

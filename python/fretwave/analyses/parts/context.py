@@ -190,7 +190,15 @@ class AnalysisContext(Generic[Section]):
             Harmonic labels, when coefficients are kept.
         attributes
             Further attributes of the group.
+
+        Raises
+        ------
+        InputError
+            The analysis has its table already.
         """
+        if any(writer.name == self.name for writer in self.writers):
+            what, fix = f"the analysis '{self.name}' asks for a second table", "write its further arrays by `dataset`"
+            raise InputError(what, file_of(type(self.analysis)), "2 calls of `writer`", "1", fix)
         described = {key: value for key, value in attributes.items() if value is not None}
         writer = AnalysisWriter(
             self.folder,
