@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fretwave as fw
+from fretwave.model.law_claims import check_tangents
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -193,6 +194,57 @@ def test_an_explicit_step_in_time_asks_for_forces_alone() -> None:
 def test_attributes_of_another_kind_are_refused(name: str, value: Any) -> None:
     with pytest.raises(fw.InputError, match=f"`{name}` of a law in Python"):
         followed(type("Odd", (Cubic,), {name: value})())
+
+
+class Across(fw.PythonLaw):
+    """A spring across its own direction: terms of 1 leave u^3 / 2."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        return u * (1 - 1 / np.sqrt(1 + u**2))
+
+    def tangent(self, u: Any, v: Any) -> Any:
+        slope = (1 - (1 + u**2) ** -1.5)[:, :, None]
+        return slope, 0.0 * slope
+
+
+class Bounded(Cubic):
+    """It has no force beyond a motion, and says so."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        if (np.abs(u) > 1).any():
+            raise ValueError("beyond the stop")
+        return super().force(u, v)
+
+
+class Late(Cubic):
+    """The tangents of a stop are twice its own."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        return np.maximum(u - 0.9, 0.0)
+
+    def tangent(self, u: Any, v: Any) -> Any:
+        slope = np.zeros((len(u), 2, 2, u.shape[2]))
+        slope[:, 0, 0], slope[:, 1, 1] = (2.0 * (u[:, k] > 0.9) for k in range(2))
+        return slope, 0.0 * slope
+
+
+def turn(components: int, size: float) -> list[Any]:
+    """Displacement and velocity of three pairs round their period."""
+    turned = np.arange(32)[:, None, None] * np.pi / 16 + np.arange(3) + 0.4 * np.arange(components)[:, None]
+    return [size * np.cos(turned), -size * np.sin(turned)]
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-10, 1e-8, 1e-6, 1e-3, 0.9995])
+def test_rounding_inside_a_law_and_the_end_of_it_tell_no_tangents(size: float) -> None:
+    for law, components in ((Across(), 1), (Bounded(), 2)):
+        u, v = turn(components, size)
+        check_tangents(law, u, v, law.force(u, v))
+
+
+def test_tangents_are_looked_at_where_the_force_is_largest() -> None:
+    u, v = turn(2, 1.0)
+    with pytest.raises(fw.InputError, match="the tangents of a law in Python are not those of its force"):
+        check_tangents(Late(), u, v, Late().force(u, v))
 
 
 class Unlike(Cubic):

@@ -129,11 +129,11 @@ def register_format(suffix: str) -> Callable[[Reader], Reader]:
     return register
 
 
-def _matrix(found: Any, path: Path, suffix: str) -> Any:
+def _matrix(found: object, path: Path, suffix: str) -> Any:
     """What a registered reader gave, if it is a matrix of numbers."""
     if isinstance(found, Entries):
         return found
-    values = found if sp.issparse(found) else np.asanyarray(found)
+    values: Any = found if sp.issparse(found) else np.asanyarray(found)
     if values.ndim != 2 or values.dtype.kind not in "biufc" or masked(values):
         kind = "masked values" if masked(values) else f"{type(found).__name__}, {values.dtype.name} {values.shape}"
         what, fix = f"the reader of {suffix} files returned no matrix of numbers", "correct the plug-in"

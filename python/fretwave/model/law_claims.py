@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,12 +25,14 @@ if TYPE_CHECKING:
 SAME, ROUNDING, OF_TANGENTS = 1e-6, 1e-12, 1e-4
 #: Of a pair's own motion: steps of the differences that its tangents are held to. How far those may be off, and how far
 #: two differences, and the two sides of one, where they tell a tangent: not across a corner, nor at a steep place.
+#: And the motions, as multiples of its own, in all of which they are off.
 STEPS, OFF, AGREE, SIDES = (1e-3, 5e-4), 1e-3, 1e-4, 1e-2
+LARGER = (1.0, 1e2, 1e4)
 MEMORY = "a law with a memory is a compiled one (src/CONTRIBUTING.md); else return what u and v of a sample alone give"
 
 
-def check_words(law: PythonLaw) -> None:
-    """Its attributes are what the core can take.
+def check_words(law: PythonLaw, base: type[PythonLaw]) -> None:
+    """Its attributes are what the core can take, and hide no method of all laws.
 
     Raises
     ------
@@ -48,7 +52,7 @@ def check_words(law: PythonLaw) -> None:
         **{
             name: (callable(value), "a method", "give what hides it another name")
             for name, value in vars(law).items()
-            if callable(getattr(type(law), name, None))
+            if callable(getattr(base, name, None))
         },
     }
     for name, (good, expected, fix) in wanted.items():
@@ -122,8 +126,8 @@ def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
         raise InputError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
 
 
-def check_tangents(law: PythonLaw, u: Array, v: Array, f: Array, tangents: tuple[Array, Array]) -> None:
-    """Tangents that it gives are those of its force, at one sample and along one direction of u and of v.
+def check_tangents(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
+    """Tangents that it gives are those of its force, at two samples and along one direction of u and of v.
 
     Newton finds the same motion with others; peaks, folds and estimated errors are read off them.
 
@@ -133,30 +137,55 @@ def check_tangents(law: PythonLaw, u: Array, v: Array, f: Array, tangents: tuple
     """
     if not u.size:  # a rank without pairs
         return
-    sample = int(np.argmax(np.abs(u * v).min(axis=1).max(axis=1)))
-    here = [np.repeat(moved[sample : sample + 1], 2 * len(STEPS), axis=0) for moved in (u, v)]
-    sides = np.array([side * step for step in STEPS for side in (1.0, -1.0)])[:, None, None]
-    for which, (name, tangent) in enumerate(zip(("du", "dv"), tangents)):
-        way = (-0.7) ** np.arange(law.components)[:, None] * np.abs(here[which][0]).max(axis=0)
-        moved = [part + sides * way if k == which else part for k, part in enumerate(here)]
-        given = (tangent[sample] * way).sum(axis=1)
-        forces = law.force(*(part.copy() for part in moved))
-        hidden = _hidden(forces)
-        with np.errstate(all="ignore"):
-            found, told = _slope(taken(law, "a force", forces, moved[0].shape), f[sample], hidden)
-            off = told & (np.abs(given - found) > OFF * np.maximum(np.abs(given), np.abs(found)) + hidden)
-        if off.any():
-            row, pair = np.argwhere(off)[0]
+    samples = [int(np.argmax(size.max(axis=1))) for size in (np.abs(u * v).min(axis=1), np.abs(f).max(axis=1))]
+    for sample, (which, name) in product(samples, enumerate(("du", "dv"))):
+        wrong = _wrong_tangent(law, u[sample : sample + 1], v[sample : sample + 1], which)
+        if wrong is not None:
+            row, given, found = wrong
             what, fix = "the tangents of a law in Python are not those of its force", "mend `tangent`, or leave it out"
-            ratio = f"of component {row}, df/{name} times a small motion is {given[row, pair]:.6g}"
-            raise InputError(what, place_of(law), ratio, f"{found[row, pair]:.6g}, by differences of `force`", fix)
+            measured = f"of component {row}, df/{name} times a small motion is {given:.6g}"
+            raise InputError(what, place_of(law), measured, f"{found:.6g}, by differences of `force`", fix)
 
 
-def _slope(forces: Array, f: Array, hidden: float) -> tuple[Array, npt.NDArray[np.bool_]]:
+def _wrong_tangent(law: PythonLaw, u: Array, v: Array, which: int) -> tuple[int, float, float] | None:
+    """Component, its change by the tangent and by differences, of a pair where these differ in larger motions too.
+
+    Inside a law terms may cancel that are far larger than its force: of a small motion that leaves steps, between which
+    differences agree (and are none). A law may end, or raise, beyond the motion.
+    """
+    off, at_first = np.ones(u.shape[1:], dtype=bool), None
+    for larger in LARGER:
+        motion = [larger * part if k == which else part for k, part in enumerate((u, v))]
+        try:
+            with np.errstate(all="ignore"):
+                given, found, here = _compared(law, motion, which)
+        except Exception:
+            return None
+        off, at_first = off & here, at_first or (given, found)
+        if not off.any():
+            return None
+    assert at_first is not None
+    row, pair = np.argwhere(off)[0]
+    return int(row), float(at_first[0][row, pair]), float(at_first[1][row, pair])
+
+
+def _compared(law: PythonLaw, motion: Sequence[Array], which: int) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Changes by the tangent and by differences of one sample (components, pairs), and where the one is wrong."""
+    sides = np.array([0.0, *(side * step for step in STEPS for side in (1.0, -1.0))])[:, None, None]
+    way = (-0.7) ** np.arange(law.components)[:, None] * np.abs(motion[which][0]).max(axis=0)
+    moved = [part + sides * way if k == which else np.repeat(part, len(sides), axis=0) for k, part in enumerate(motion)]
+    raw, tangent = law.force(*(part.copy() for part in moved)), law.tangent(*(part.copy() for part in motion))[which]
+    given, hidden = (np.asarray(tangent, dtype=float)[0] * way).sum(axis=1), _hidden(raw)
+    f, *forces = taken(law, "a force", raw, moved[0].shape)
+    found, told = _slope(forces, f, hidden)
+    return given, found, told & (np.abs(given - found) > OFF * np.maximum(np.abs(given), np.abs(found)) + hidden)
+
+
+def _slope(forces: Sequence[Array], f: Array, hidden: float) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Change of the force with a motion, by differences (components, pairs), and where these tell it."""
     wide, narrow = ((forces[k] - forces[k + 1]) / (2 * step) for k, step in zip((0, 2), STEPS))
     bent = np.abs(forces[0] + forces[1] - 2 * f) / (2 * STEPS[0])
-    agree = np.abs(wide - narrow) <= AGREE * np.abs(narrow) + hidden
+    agree = (np.abs(wide - narrow) <= AGREE * np.abs(narrow) + hidden) & (narrow != 0)
     return narrow, agree & (bent <= SIDES * np.abs(wide) + hidden)
 
 

@@ -27,8 +27,8 @@ class PythonLaw:
     pairs stick, slip and are open in tables, pictures and views.
 
     It is held to what it says of itself (`law_claims`): a force of another shape, odd or with a memory against its word
-    is refused, and tangents that are not those of the force. For that `force` is asked now and then for one sample of a
-    motion, for its mirror and beside it.
+    is refused, and tangents that are seen not to be those of the force. For that `force` is asked now and then for one
+    sample of a motion, for its mirror, and both beside some samples and beside larger motions.
 
     With `register_law` a case names it as any other; it is then made with its parameters as keywords, each (n_pairs,).
 
@@ -124,7 +124,7 @@ class PythonLaw:
         if self._is_due():
             check_motion(self, u, v, f)
             if type(self).tangent is not PythonLaw.tangent:
-                check_tangents(self, u, v, f, tangents)
+                check_tangents(self, u, v, f)
         return f, *tangents
 
     def _force_alone(self, u: Array, v: Array) -> Array:
@@ -177,6 +177,6 @@ def python_law(law: PythonLaw, pairs: npt.NDArray[np.intp]) -> Any:
     """
     from .. import _core
 
-    check_words(law)
+    check_words(law, PythonLaw)
     law.pairs = pairs
     return _core.python_law(law, len(pairs))

@@ -181,15 +181,17 @@ class AnalysisWriter:
             f"field/{name}": np.asarray((fields or {})[name], dtype=float) for name in self.fields
         }
         if coefficients is not None and self._labels:
-            spread, shape = isinstance(coefficients, Spread), (len(self._dofs), len(labels or self._labels))
-            arrays["coefficients"] = coefficients if spread else self._fitting(coefficients, shape)
+            shape = (len(self._dofs), len(labels or self._labels))
+            arrays["coefficients"] = (
+                coefficients if isinstance(coefficients, Spread) else self._fitting(coefficients, shape)
+            )
             if len(labels) > len(self._labels):
                 values[LABELS] = list(labels)
         for contact, motion in (motions or {}).items():
             arrays.update({f"motion/{contact}/{key}": values for key, values in _kept(motion)})
         return Record("row", values, arrays)
 
-    def _fitting(self, coefficients: Any, shape: tuple[int, int]) -> npt.NDArray[Any]:
+    def _fitting(self, coefficients: npt.ArrayLike, shape: tuple[int, int]) -> npt.NDArray[Any]:
         """Coefficients as an array that has a row for each dof and a column for each label, or fewer."""
         found = np.asarray(coefficients)
         if found.shape[:1] != shape[:1] or found.ndim != 2 or found.shape[1] > shape[1] or np.iscomplexobj(found):
