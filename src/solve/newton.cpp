@@ -100,9 +100,9 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
     if (*reason == 0) {
       *reason = newton.judge(y, std::max(unknowns, 1.0), step, residual, before);
       if (*reason == 0 && creeps) *reason = SNES_DIVERGED_MAX_IT;
-    } else if (iteration < patience && newton.matters(y, residual, before))
+    } else if (newton.linear_->hurried() || (iteration < patience && newton.matters(y, residual, before))) {
       *reason = SNES_CONVERGED_ITERATING;
-    if (*reason > 0 && newton.linear_->hurried()) *reason = SNES_CONVERGED_ITERATING;
+    }
   });
 }
 
@@ -175,12 +175,15 @@ PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
   return newton.linear_->guard().run([&] { newton.bordered_.residual(y, g); });
 }
 
-/// Where six digits end in the tolerance or in rounding they may end the iteration.
+/// Where six digits end in the tolerance or in rounding they may end the iteration, and next to rounding they
+/// do: no step is foretold there.
 void Newton::aim(Vec y) {
   double residual, tolerance;
   check(SNESGetFunctionNorm(snes_, &residual));
   check(SNESGetTolerances(snes_, &tolerance, nullptr, nullptr, nullptr, nullptr));
-  linear_->aim(residual, step_from_, std::max(tolerance, bordered_.problem().rounding(y)));
+  const double rounding = bordered_.problem().rounding(y),
+               before = residual <= near * rounding ? 0 : step_from_;
+  linear_->aim(residual, before, std::max(tolerance, rounding));
 }
 
 PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) {

@@ -82,10 +82,10 @@ def blade(comm, **changes):
     return fw.Model(M, K, None, [fw.Contact("coulomb_3d", B, {**ROOT, **changes}, "root")], comm)
 
 
-def preloaded(model):
+def preloaded(model, times=1.0):
     """First bending of the stuck blade, and the rest under a pull along the axis with a small push across."""
     first = fw.linear_modes(model, 1, "stuck")[0]
-    return first, static_preload(model, np.tile([100.0, 1.0, 0, 0, 0, 0], ELEMENTS + 1), first)
+    return first, static_preload(model, times * np.tile([100.0, 1.0, 0, 0, 0, 0], ELEMENTS + 1), first)
 
 
 #: Routes by name: the basis of stuck pairs, and dense blocks as without it.
@@ -202,6 +202,19 @@ def test_steps_of_a_large_problem_are_solved_as_far_as_they_lead(case, method):
         assert one["amplitude"] == pytest.approx(other["amplitude"], rel=SOLVED)
         assert one["omega"] == pytest.approx(other["omega"], rel=SOLVED)
         assert one["beta"] == pytest.approx(other["beta"], rel=SOLVED, abs=SOLVED * other["omega"])
+
+
+@pytest.mark.parametrize("amplitude", [3e-8, 1e-7, 3e-7])
+def test_steps_of_a_large_problem_end_where_rounding_holds_the_residual(comm, amplitude):
+    """No step foretells the next there: taken for hurried ones, all 25 were spent, and there was no solution."""
+    stiff = {key: 1e3 * ROOT[key] for key in ("normal_stiffness", "tangential_stiffness")}
+    model = blade(comm, **stiff)
+    problem = mode(model, *preloaded(model, 1e8), "krylov")
+    with options(fw_linear_large=10):
+        followed = fw.Continuation(problem, problem.initial(amplitude), (amplitude, 1.02 * amplitude))
+        points = list(followed)
+    assert followed.converged, followed.reason
+    assert max(p.newton for p in points[:1]) <= 12
 
 
 @pytest.mark.parametrize("digits", [1e-3, 1e-6])
