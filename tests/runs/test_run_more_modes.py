@@ -41,12 +41,14 @@ accuracy = 1e-2
 """
 
 
-def chain(folder: Path, reduction: str) -> Path:
+SLIDER = 'law = "jenkins"\npairs = ["m20"]\ntangential_stiffness = 50.0\nfriction_limit = 1.0\n'
+
+
+def chain(folder: Path, reduction: str, contact: str = SLIDER, analyses: str = MODES) -> Path:
     """60 unit masses on a slider, of whose first mode the harmonics meet higher ones; and two analyses of it."""
     K = 100.0 * (2 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1))
     model = f"[model]\ndofs = {[f'm{k}' for k in range(N)]}\nM = {np.eye(N).tolist()}\nK = {K.tolist()}\n"
-    slider = '[[contact]]\nlaw = "jenkins"\npairs = ["m20"]\ntangential_stiffness = 50.0\nfriction_limit = 1.0\n'
-    text = f"{model}mass_damping = 0.02\n{reduction}\n{slider}{MODES}".replace("'", '"')
+    text = f"{model}mass_damping = 0.02\n{reduction}\n[[contact]]\n{contact}{analyses}".replace("'", '"')
     (folder / "case.toml").write_text(text)
     return folder / "case.toml"
 
@@ -129,10 +131,26 @@ def test_twice_as_many_up_to_all_there_are(monkeypatch, few: int, inner: int, ta
     monkeypatch.setattr(more_modes, "choice_of", lambda case: Choice(1e-6, 1))
     reason = "stop value reached; accuracy 0.01 kept at 3 of 40 points, 30 limited by the reduction, 7 limited by"
     case: Any = SimpleNamespace(reduced=SimpleNamespace(component_modes=few, inner=inner))
-    more_modes.expect_enough(case, "a", f"{reason} the solver".replace("30", "6"))
+    assert more_modes.expect_enough(case, "a", f"{reason} the solver".replace("30", "6"), {}) == ""
     with pytest.raises(more_modes.TooFewModes) if taken else nullcontext() as found:
-        more_modes.expect_enough(case, "a", f"{reason} harmonics")
-    assert not taken or found.value.entry["taken"] == taken
+        assert more_modes.expect_enough(case, "a", f"{reason} harmonics", {}) == f"{few} are the most that are taken"
+    assert not taken or found.value.entry == {"analysis": "a", "limited_by": few, "points": [30, 40], "taken": taken}
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("ended", ["stop value reached", "the branch comes back to amplitude 0.01, where it began"])
+@pytest.mark.parametrize(("limited", "points", "helped"), [(15, 20, False), (16, 20, False), (29, 39, True)])
+def test_no_more_are_taken_where_twice_as_many_have_not_helped(
+    monkeypatch, ended: str, limited: int, points: int, helped: bool
+) -> None:
+    """Of its own points: what another analysis has gained by them says nothing."""
+    monkeypatch.setattr(more_modes, "choice_of", lambda case: Choice(1e-6, 1))
+    case: Any = SimpleNamespace(reduced=SimpleNamespace(component_modes=40, inner=1000))
+    reason = f"{ended}; accuracy 0.01 kept at 1 of {points} points, {limited} limited by the reduction (more)"
+    given = [{"analysis": name, "limited_by": 20, "points": [n, 40], "taken": 40} for name, n in (("a", 30), ("b", 1))]
+    with pytest.raises(more_modes.TooFewModes) if helped else nullcontext():
+        why = more_modes.expect_enough(case, "a", reason, {more_modes.GREW: given})
+        assert why == f"20 limited 30 of 40 points, 40 limit {limited} of {points}"
 
 
 @pytest.mark.ranks(2)

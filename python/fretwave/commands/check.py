@@ -18,8 +18,9 @@ from ..mpi.guard import on_first_rank
 from ..run.at_rest import at_rest
 from ..run.left_out import of_the_flow
 from ..run.order import RunOptions, in_order
-from ..run.runner import check_sweeps
+from ..run.runner import Runner
 from ..run.stopped import joined
+from ..run.sweep_analysis import checked_sweeps
 from ..run.wide import check_in_time, run_wide
 from ..texts import counted, display
 
@@ -44,7 +45,7 @@ def check_case(
     case = on_first_rank(comm, lambda: _load(path, overrides, quick))
     names = in_order(case, checks.choose(list(case.analyses), only))
     on_first_rank(comm, lambda: checks.check_chosen([case.analyses[name] for name in names], case))
-    check_sweeps(case, names, RunOptions(overrides=list(overrides), quick=quick), comm)
+    checked_sweeps(Runner, case, names, RunOptions(overrides=list(overrides), quick=quick), comm)
     check_in_time(case, names, run_wide(case, names))
     warnings = odd_ratios(case)
     case = reduce_case(case, comm, only=names)

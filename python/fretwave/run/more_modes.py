@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..case.component_modes import MOST, choice_of
 from ..case.load import Case
-from .stopped import limited_by
+from .stopped import limited_points, most_limiting
 
-#: Of run.json: an analysis, the number of component modes that limited it, and the number taken in its place.
+#: Of run.json: an analysis, the number of component modes that limited it, at how many of how many points, and the
+#: number taken in its place.
 GREW = "component_modes_grew"
+#: Of an analysis in run.json: why a run has taken no more component modes though these limit it.
+KEPT = "component_modes_kept"
 
 
 class TooFewModes(Exception):
@@ -22,8 +25,13 @@ class TooFewModes(Exception):
         self.entry = dict(entry)
 
 
-def expect_enough(case: Case, name: str, reason: str) -> None:
+def expect_enough(case: Case, name: str, reason: str, record: Mapping[str, Any]) -> str:
     """Of a reduced case whose analysis ended for this reason.
+
+    Returns
+    -------
+    str
+        Why no more are taken though component modes limit its accuracy; empty where they do not, or were told.
 
     Raises
     ------
@@ -31,11 +39,23 @@ def expect_enough(case: Case, name: str, reason: str) -> None:
         Component modes limit its accuracy, their number was chosen, and there are more.
     """
     found = case.reduced
-    if found is None or limited_by(reason) != "reduction" or choice_of(case) is None:
-        return
+    if found is None or most_limiting(reason) != "reduction" or choice_of(case) is None:
+        return ""
     few, more = found.component_modes, min(2 * found.component_modes, MOST, found.inner)
-    if more > few:
-        raise TooFewModes({"analysis": name, "limited_by": few, "taken": more})
+    limited, points = limited_points(reason, "reduction")
+    why = _no_gain(record, name, few, limited, points)
+    if not why and more > few:
+        raise TooFewModes({"analysis": name, "limited_by": few, "points": [limited, points], "taken": more})
+    return why or f"{few} are the most that are taken"
+
+
+def _no_gain(record: Mapping[str, Any], name: str, modes: int, limited: int, points: int) -> str:
+    """The last that were taken for its sake limit no smaller share of its points."""
+    own = [one for one in record.get(GREW, ()) if one["analysis"] == name and "points" in one]
+    if not own or limited * own[-1]["points"][1] < own[-1]["points"][0] * points:
+        return ""
+    before, (at, of) = own[-1]["limited_by"], own[-1]["points"]
+    return f"{before} limited {at} of {of} points, {modes} limit {limited} of {points}"
 
 
 def grown(record: Mapping[str, Any]) -> int | None:
@@ -53,4 +73,12 @@ def on_these(record: Mapping[str, Any], attributes: Mapping[str, Any]) -> bool:
 def line(record: Mapping[str, Any]) -> str:
     """In words, for the end of a run; empty where those that were chosen were enough."""
     steps = [f"{one['limited_by']} limited the accuracy of '{one['analysis']}'" for one in record.get(GREW, ())]
+    own = {name: entry for name, entry in record["analyses"].items() if name in record["selected"]}
+    steps += [f"no more for '{name}'" for name, entry in own.items() if steps and entry.get(KEPT)]
     return f"reduction: {grown(record)} component modes: {', '.join(steps)}" if steps else ""
+
+
+def begin_anew(record: dict[str, Any], names: Sequence[str], few: Mapping[str, Any]) -> None:
+    """Take note of more component modes; what was found on fewer is not of the run any more."""
+    record.setdefault(GREW, []).append(few)
+    record["analyses"] = {name: entry for name, entry in record["analyses"].items() if name not in names}

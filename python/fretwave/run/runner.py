@@ -135,7 +135,7 @@ class Runner:
         names = in_order(self.case, checks.choose(list(self.case.analyses), self.options.only))
         on_first_rank(self.comm, lambda: self._check_needs(names))
         on_first_rank(self.comm, lambda: checks.check_chosen([self.case.analyses[name] for name in names], self.case))
-        sweeps = check_sweeps(self.case, names, self.options, self.comm)
+        sweeps = self._sweeps(names)
         self.folder.record["selected"] = names
         self.wide = run_wide(self.case, names, self.options.petsc, self.unread.read)
         check_in_time(self.case, names, self.wide)
@@ -147,6 +147,14 @@ class Runner:
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
         return EXIT_DONE
+
+    def _sweeps(self, names: Sequence[str]) -> dict[str, Sweep]:
+        """The sweeps among some analyses, checked with each of their values. Collective."""
+        if not any(self.case.analyses[name].sweeps for name in names):
+            return {}
+        from .sweep_analysis import checked_sweeps
+
+        return checked_sweeps(Runner, self.case, names, self.options, self.comm)
 
     def _solve(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
         """All analyses; anew, all on one basis, where one of them finds the component modes too few."""
@@ -166,8 +174,7 @@ class Runner:
     def _forget(self, names: Sequence[str], few: Mapping[str, Any]) -> None:
         """What was found on too few component modes is not of this run any more. Collective."""
         record = self.folder.record
-        record.setdefault(more_modes.GREW, []).append(few)
-        record["analyses"] = {name: entry for name, entry in record["analyses"].items() if name not in names}
+        more_modes.begin_anew(record, names, few)
         self.failures.clear()
         self.unread.lines.clear()
         on_first_rank(self.comm, lambda: (self.folder.path / NAME).unlink(missing_ok=True))
@@ -319,11 +326,7 @@ class Runner:
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
             unread = self.unread.of_analysis(options)
-        try:
-            more_modes.expect_enough(self.case, analysis.name, outcome.reason)
-        except more_modes.TooFewModes:
-            context.forget()
-            raise
+        self._enough_modes(context, outcome)
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
         if unread and outcome.points:
@@ -332,6 +335,17 @@ class Runner:
             with event("FwCurve"):
                 context.write_curves()
         context.publish(outcome)  # last of all: from here on a resumed run leaves the analysis as it is
+
+    def _enough_modes(self, context: AnalysisContext[Any], outcome: Outcome) -> None:
+        """Where component modes limit an analysis: begin anew on more, else say why there are no more. Collective."""
+        try:
+            why = more_modes.expect_enough(self.case, context.name, outcome.reason, self.folder.record)
+        except more_modes.TooFewModes:
+            context.forget()
+            raise
+        if why:
+            outcome.summary.append(f"{context.name}: no more component modes are taken: {why}")
+            context.entry[more_modes.KEPT] = why
 
     def _sweep(self, name: str, sweep: Sweep) -> None:
         """Run another analysis for every value, on groups of ranks."""
@@ -392,18 +406,3 @@ class Runner:
             f"{word} after {duration(seconds)}; `fretwave show {display(self.folder.path)}` lists the results"
         )
         on_first_rank(self.comm, self.folder.close)
-
-
-def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: MPI.Comm) -> dict[str, Sweep]:
-    """The sweeps among some analyses, after the case was loaded with each of their values. Collective."""
-    sweeps: dict[str, Sweep] = {}
-    if not any(case.analyses[name].sweeps for name in names):
-        return sweeps
-    from ..analyses.sweep import SweepAnalysis
-    from .sweep_analysis import analysis_sweep
-
-    for name, analysis in case.analyses.of(SweepAnalysis).items():
-        if name in names:
-            sweeps[name] = analysis_sweep(Runner, case, analysis, options, comm.size)
-            sweeps[name].check(comm)
-    return sweeps

@@ -87,10 +87,20 @@ def _of_accuracy(name: str, reason: str) -> str:
 
 def limited_by(reason: str) -> str:
     """What limits most points of a branch that is whole, but not as accurate as it was to be; else nothing."""
-    if f"{REACHED}; accuracy" not in reason:
-        return ""
+    return most_limiting(reason) if f"{REACHED}; accuracy" in reason else ""
+
+
+def most_limiting(reason: str) -> str:
+    """What limits most points of a branch that is not as accurate as it was to be, however it ended; else nothing."""
     shares = [(int(found[1]), found[2]) for found in re.finditer(r"(\d+) limited by (?:the )?(\w+)", reason)]
     return max(shares, default=(0, ""))[1]
+
+
+def limited_points(reason: str, source: str) -> tuple[int, int]:
+    """At how many points of its branches a source of error limits the accuracy, and how many there are."""
+    limited = re.findall(rf"(\d+) limited by (?:the )?{source}\b", reason)
+    points = re.findall(r"kept at \d+ of (\d+) points", reason)
+    return sum(map(int, limited)), sum(map(int, points))
 
 
 def _other_end(name: str, reason: str) -> str:

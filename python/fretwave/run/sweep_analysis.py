@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,6 +47,18 @@ def analysis_sweep(
     plan, places = analysis.plan(), dict.fromkeys(own, overrides)
     count = None if analysis.groups is None else min(analysis.groups, ranks)
     return Sweep(runner, case.path, plan, chosen, Path(), count, case.text, over, places)
+
+
+def checked_sweeps(
+    runner: Callable[..., Any], case: Case, names: Sequence[str], options: RunOptions, comm: MPI.Comm
+) -> dict[str, Sweep]:
+    """The sweeps among some analyses, after the case was loaded with each of their values. Collective."""
+    sweeps: dict[str, Sweep] = {}
+    for name, analysis in case.analyses.of(SweepAnalysis).items():
+        if name in names:
+            sweeps[name] = analysis_sweep(runner, case, analysis, options, comm.size)
+            sweeps[name].check(comm)
+    return sweeps
 
 
 def place_of(case: Case, name: str, key: str) -> str:
