@@ -158,17 +158,3 @@ def test_all_ranks_take_them(shared_tmp: Path, comm: MPI.Comm) -> None:
     path = on_first_rank(comm, lambda: chain(shared_tmp, "[reduction]"))
     assert run_case(path, RunOptions(shared_tmp / "run", plots=False), comm) == 0
     assert on_first_rank(comm, lambda: modes_of(shared_tmp)) == [59, 59]
-
-
-@pytest.mark.ranks(1)
-def test_results_of_fewer_modes_are_not_taken_for_those_of_more(tmp_path: Path) -> None:
-    """Of an earlier run into the folder, with which another analysis is compared."""
-    path = chain(tmp_path, "[reduction]")
-    forced = 'name = "f"\ntype = "forced"\nobserve = "m20"\nforce = { m20 = 1.0 }\nlevels = [0.1]\nharmonics = 1\n'
-    path.write_text(f'{path.read_text()}[[analysis]]\n{forced}frequency = [0.11, 0.12]\nbackbone = ["a", "b"]\n')
-    words = ("--no-plots", "--out", tmp_path / "run", "--only")
-    assert call("run", path, *words, "a") == 0 and call("run", path, *words, "b,f") == 0
-    left_out = record(tmp_path)["analyses"]["f"]["left_out"]
-    assert [text for text in left_out if "backbone" in text or "distance" in text] == [
-        "distance of the peaks from 'a' (no results of it in this folder)"
-    ]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +20,11 @@ from .observed import label_of
 
 if TYPE_CHECKING:
     import h5py
+
+    from .component_modes import Choice
+
+#: Of the reduction that results are on: what the number of its component modes was chosen for, where it was.
+CHOSEN_FOR = "chosen_for"
 
 
 def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:
@@ -74,14 +81,52 @@ def described(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, A
         keys[observed[0]] = label_of(observed[1])
     plain = {key: value for key, value in keys.items() if value is not None and not isinstance(value, dict)}
     shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
-    reduction = {"reduction": json.dumps(case.reduced.plain())} if case.reduced else {}
+    reduction = {"reduction": json.dumps({**case.reduced.plain(), **_chosen_for(case)})} if case.reduced else {}
     laws = json.dumps({contact.name: contact.info.plain() for contact in case.contacts})
     return {**shown, **reduction, "laws": laws, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
+
+
+def _chosen_for(case: Case) -> dict[str, Any]:
+    """What the number of a reduced case's component modes was chosen for; empty where it was told."""
+    from .component_modes import choice_of
+
+    choice = choice_of(case)
+    return {CHOSEN_FOR: [choice.asked, choice.frequencies, choice.up_to_hz]} if choice else {}
 
 
 def _deciding(case: Case, name: str) -> dict[str, Any]:
     decisive = (*COMMON, name, *case.analyses[name].decided_by())
     return {key: value for key, value in case.resolved.items() if key.split(".")[0] in decisive}
+
+
+@dataclass(frozen=True)
+class KeptOn:
+    """The reduction that results in a run folder are on.
+
+    Attributes
+    ----------
+    modes : number of component modes, None of an unreduced case
+    chosen_for : accuracy [-], number of frequencies and highest frequency [Hz] that this was chosen for; empty if told
+    """
+
+    modes: int | None
+    chosen_for: tuple[float, ...] = ()
+
+    def serves(self, choice: Choice) -> bool:
+        """Its number was chosen for no less than a choice asks for."""
+        asked, frequencies, up_to_hz = self.chosen_for or (math.inf, 0, 0.0)
+        return asked <= choice.asked and frequencies >= choice.frequencies and up_to_hz >= choice.up_to_hz
+
+
+def kept_on(folder: Path, case: Case, name: str) -> KeptOn | None:
+    """Of results of an analysis that belong to a case as it is before it is reduced; None where there are none."""
+    if not has_results(folder):
+        return None
+    with open_results(folder / "results.h5") as file:
+        if name not in file or not belongs(file[name], replace(case, reduced=None), name):
+            return None
+        found = json.loads(file[name].attrs.get("reduction", "{}"))
+    return KeptOn(found.get("component_modes"), tuple(found.get(CHOSEN_FOR, ())))
 
 
 def has_analysis(folder: Path, case: Case, name: str) -> bool:

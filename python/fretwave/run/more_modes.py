@@ -11,7 +11,7 @@ from ..case.load import Case
 from .stopped import limited_points, most_limiting
 
 #: Of run.json: an analysis, the number of component modes that limited it, at how many of how many points, and the
-#: number taken in its place.
+#: number taken in its place; or an analysis whose results are read, and the number that they are on.
 GREW = "component_modes_grew"
 #: Of an analysis in run.json: why a run has taken no more component modes though these limit it.
 KEPT = "component_modes_kept"
@@ -43,10 +43,16 @@ def expect_enough(case: Case, name: str, reason: str, record: Mapping[str, Any])
         return ""
     few, more = found.component_modes, min(2 * found.component_modes, MOST, found.inner)
     limited, points = limited_points(reason, "reduction")
-    why = _no_gain(record, name, few, limited, points)
+    why = _fixed(record) or _no_gain(record, name, few, limited, points)
     if not why and more > few:
         raise TooFewModes({"analysis": name, "limited_by": few, "points": [limited, points], "taken": more})
     return why or f"{few} are the most that are taken"
+
+
+def _fixed(record: Mapping[str, Any]) -> str:
+    """Results of an earlier run that are needed are on this number."""
+    needed = [one["analysis"] for one in record.get(GREW, ()) if one.get("needed")]
+    return f"the results of '{needed[0]}', which are needed, are on {grown(record)}" if needed else ""
 
 
 def _no_gain(record: Mapping[str, Any], name: str, modes: int, limited: int, points: int) -> str:
@@ -72,10 +78,16 @@ def on_these(record: Mapping[str, Any], attributes: Mapping[str, Any]) -> bool:
 
 def line(record: Mapping[str, Any]) -> str:
     """In words, for the end of a run; empty where those that were chosen were enough."""
-    steps = [f"{one['limited_by']} limited the accuracy of '{one['analysis']}'" for one in record.get(GREW, ())]
+    steps = [_step(one) for one in record.get(GREW, ())]
     own = {name: entry for name, entry in record["analyses"].items() if name in record["selected"]}
     steps += [f"no more for '{name}'" for name, entry in own.items() if steps and entry.get(KEPT)]
     return f"reduction: {grown(record)} component modes: {', '.join(steps)}" if steps else ""
+
+
+def _step(one: Mapping[str, Any]) -> str:
+    if "limited_by" in one:
+        return f"{one['limited_by']} limited the accuracy of '{one['analysis']}'"
+    return f"as the results of '{one['analysis']}' from an earlier run"
 
 
 def begin_anew(record: dict[str, Any], names: Sequence[str], few: Mapping[str, Any]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +12,12 @@ from ..analyses.parts.context import AnalysisContext, Outcome, outcome_of
 from ..case import checks
 from ..case.analysis import AnalysisSection
 from ..case.build import model_of
-from ..case.kept import described, has_analysis, reload_case
+from ..case.kept import described, reload_case
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
 from ..console import Console, Estimate, Shown, duration
-from ..errors import EXIT_DONE, InputError, NotConverged
+from ..errors import EXIT_DONE, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.log import event
@@ -29,6 +30,7 @@ from ..results.results import has_results, open_results
 from ..results.runfolder import RunFolder, new_record, peak_memory_mb, results_folder
 from ..texts import counted, display
 from . import more_modes
+from .already import check_needed, status_of, take_modes_of_others
 from .left_out import left_out_lines
 from .order import RunOptions, in_order
 from .pictures import plot
@@ -133,7 +135,7 @@ class Runner:
         if not self.folder.started:
             on_first_rank(self.comm, self.folder.check_free)
         names = in_order(self.case, checks.choose(list(self.case.analyses), self.options.only))
-        on_first_rank(self.comm, lambda: self._check_needs(names))
+        on_first_rank(self.comm, lambda: check_needed(self.case, names, self.folder.path, None))
         on_first_rank(self.comm, lambda: checks.check_chosen([self.case.analyses[name] for name in names], self.case))
         sweeps = self._sweeps(names)
         self.folder.record["selected"] = names
@@ -159,9 +161,11 @@ class Runner:
     def _solve(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
         """All analyses; anew, all on one basis, where one of them finds the component modes too few."""
         given, reduced, again = self.case, [name for name in names if name not in sweeps], self.resuming
+        if not self.resuming:
+            take_modes_of_others(given, reduced, self.folder.path, self.folder.record, self.comm)
         while True:
-            self._reduce(reduced)
             try:
+                self._reduce(reduced)
                 return self._run_all(names, sweeps, again)
             except more_modes.TooFewModes as error:
                 few = error.entry
@@ -226,6 +230,8 @@ class Runner:
             for line in self.case.reduced.lines():
                 self.console.line(line)
             self.folder.record["reduction"] = self.case.reduced.plain()
+            modes, folder = self.case.reduced.component_modes, self.folder.path
+            on_first_rank(self.comm, lambda: check_needed(self.case, names, folder, modes))
 
     def _keep_basis(self, reduction: Reduction | SectorReduction) -> None:
         """For `fretwave view`: of a model with nodes, and not of the runs of a sweep. Collective."""
@@ -249,30 +255,9 @@ class Runner:
         write, self._basis = self._basis, _nothing
         on_first_rank(self.comm, write)
 
-    def _check_needs(self, names: Sequence[str]) -> None:
-        """Analyses whose results another needs: of this run, or kept in the folder."""
-        for name in names:
-            for needed in self.case.analyses[name].needs():
-                if needed not in names and not has_analysis(self.folder.path, self.case, needed):
-                    raise InputError(
-                        f"'{name}' needs the results of '{needed}'",
-                        where="--only",
-                        measured=f"no results of '{needed}' for this case in {display(self.folder.path)}",
-                        fix=f"--only {needed},{name}",
-                    )
-
-    def _status(self, name: str) -> str | None:
-        """Of what this run has of an analysis in its results, None for nothing. One rank only."""
-        if not has_results(self.folder.path):
-            return None
-        with open_results(self.folder.path / "results.h5") as file:
-            found, record = file[name].attrs if name in file else {}, self.folder.record
-            mine = found.get("run_id") == record["run_id"] and more_modes.on_these(record, found)
-            return str(found.get("status")) if mine else None
-
     def _is_done(self, name: str) -> bool:
         def look() -> str | None:
-            status = self._status(name)
+            status = status_of(name, self.folder.path, self.folder.record)
             if status in ENDED:
                 Journal(self.folder.path, name).remove()  # killed when all was in results.h5 but this was left
             return status
@@ -289,7 +274,8 @@ class Runner:
         return True
 
     def _is_begun(self, name: str) -> bool:
-        return self.resuming and on_first_rank(self.comm, lambda: self._status(name) is not None)
+        look = partial(status_of, name, self.folder.path, self.folder.record)
+        return self.resuming and on_first_rank(self.comm, look) is not None
 
     def _run_one(self, analysis: AnalysisSection) -> None:
         from .. import _core
