@@ -157,3 +157,23 @@ def test_a_run_says_that_more_of_them_have_not_helped(tmp_path: Path, monkeypatc
     assert record(tmp_path)["reduction"]["component_modes"] == 40
     assert f"a: no more component modes are taken: {why}" in log(tmp_path)
     assert log(tmp_path)[-2] == "reduction: 40 component modes: 20 limited the accuracy of 'a', no more for 'a'"
+
+
+def test_sweeps_say_which_numbers_their_values_have_taken(tmp_path: Path) -> None:
+    swept = '[[analysis]]\nname = "s"\ntype = "sweep"\nof = "a"\nover.contact.stop.gap = [0.02]\n'
+    chain(tmp_path, "[reduction]", STOP, f"{ANALYSES}\n{swept}")
+    over = ("--over", "contact.stop.gap=0.02", "--only", "a", "--no-plots")
+    assert call("sweep", tmp_path / "case.toml", *over, "--out", tmp_path / "swept") == 0
+    assert run(tmp_path, "s") == 0
+    line = "reduction: component modes in place of those chosen at 1 of 1 value: 40 at 1 value"
+    assert f"{line}: 20 limited the accuracy of 'a'" in (tmp_path / "swept" / "run.log").read_text()
+    assert f"s: {line}: 20 limited the accuracy of 'a'" in log(tmp_path)
+
+
+def test_values_of_a_sweep_in_one_line() -> None:
+    grew = {"analysis": "a", "limited_by": 20, "points": [3, 4], "taken": 40}
+    records = [{}, {more_modes.GREW: [grew]}, None, {more_modes.GREW: [grew, {**grew, "limited_by": 40, "taken": 80}]}]
+    (line,) = more_modes.line_of_values(records)
+    assert line.startswith("reduction: component modes in place of those chosen at 2 of 4 values: 40 at 1 value, 80 at")
+    assert line.endswith(": 20 limited the accuracy of 'a', 40 limited the accuracy of 'a'")
+    assert more_modes.line_of_values([{}, None]) == []

@@ -145,7 +145,7 @@ def _write(
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]
         write_rows(folder.path / "summary.csv", ordered)
     sweep.forget_others()
-    return outcomes, lines
+    return outcomes, [*lines, *sweep.grew(run_id)]
 
 
 def _incomplete(

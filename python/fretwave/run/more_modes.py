@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..case.component_modes import MOST, choice_of
 from ..case.load import Case
+from ..texts import counted
 from .stopped import limited_points, most_limiting
 
 #: Of run.json: an analysis, the number of component modes that limited it, at how many of how many points, and the
@@ -88,6 +90,19 @@ def _step(one: Mapping[str, Any]) -> str:
     if "limited_by" in one:
         return f"{one['limited_by']} limited the accuracy of '{one['analysis']}'"
     return f"as the results of '{one['analysis']}' from an earlier run"
+
+
+def line_of_values(records: Iterable[Mapping[str, Any] | None]) -> list[str]:
+    """The same of the values of a sweep, in one line; none where those that were chosen were enough for all."""
+    every = list(records)
+    grew = [record for record in every if record is not None and record.get(GREW)]
+    if not grew:
+        return []
+    numbers = Counter(grown(record) for record in grew)
+    found = ", ".join(f"{modes} at {counted(n, 'value')}" for modes, n in sorted(numbers.items()))
+    steps = dict.fromkeys(_step(one) for record in grew for one in record[GREW])
+    of = f"{len(grew)} of {counted(len(every), 'value')}"
+    return [f"reduction: component modes in place of those chosen at {of}: {found}: {', '.join(steps)}"]
 
 
 def begin_anew(record: dict[str, Any], names: Sequence[str], few: Mapping[str, Any]) -> None:

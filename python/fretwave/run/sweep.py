@@ -32,6 +32,7 @@ from ..post.grid import Plan
 from ..results.runfolder import RECORD, new_record, read_record
 from ..results.sweeps import Branch, read_branch
 from ..texts import counted, display
+from .more_modes import line_of_values
 from .order import RunOptions, in_order
 
 if TYPE_CHECKING:
@@ -164,6 +165,10 @@ class Sweep:
         names, lines = ([one for one in told[0][key] if all(one in own[key] for own in told)] for key in told[0])
         said = said_unread([name for name in names if name not in elsewhere])
         return names, [*lines, *([lead + said] if said else [])]
+
+    def grew(self, run_id: str) -> list[str]:
+        """A line on values that have taken more component modes than were chosen, if any. One rank only."""
+        return line_of_values(self._record(number, run_id) for number in range(len(self.plan)))
 
     def forget_others(self) -> None:
         """Remove runs of values of an earlier sweep that had more of them. One rank only."""

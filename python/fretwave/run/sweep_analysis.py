@@ -84,7 +84,7 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
             summary = folder.path / f"{name}_summary.csv"
             rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
         sweep.forget_others()
-        lines = summary_lines(name, sweep.plan, branches, rows)
+        lines = [*summary_lines(name, sweep.plan, branches, rows), *(f"{name}: {one}" for one in sweep.grew(run_id))]
         points = sum(branch.points for branch in branches)
         advice = next((error.fix for error in errors if error is not None and error.fix), "")
         return Outcome(points, reason, not bad, lines, f"{len(sweep.plan)} whole branches", advice)
