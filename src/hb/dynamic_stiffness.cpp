@@ -15,12 +15,14 @@ namespace {
 const Tuned dense_share("stiffness_dense_share", 0.25,
                         "share of nonzero entries from which a dense product is the faster one");
 
+constexpr PetscInt few = 16;  // dofs, of which neither a dense nor an exact product is worth its way
+
 bool is_dense(Mat A) {
   MatInfo info;
   PetscInt n;
   check(MatGetSize(A, &n, nullptr));
   check(MatGetInfo(A, MAT_GLOBAL_SUM, &info));
-  return n > 16 && info.nz_used > dense_share * double(n) * double(n);
+  return n > few && info.nz_used > dense_share * double(n) * double(n);
 }
 
 }  // namespace
@@ -33,7 +35,7 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
       row_sums_.back()[row - model.first_dof()] += std::abs(value);
     });
     blocked_.emplace_back();
-    blocked_.back().stiffness = term.order == 0 && term.phase == 0;
+    blocked_.back().stiffness = term.order == 0 && term.phase == 0 && model.dofs() > few;
     if (!is_dense(term.A)) {
       blocked_.back().sparse.emplace(term.A, h.block_size());
       continue;
