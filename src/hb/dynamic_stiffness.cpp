@@ -15,7 +15,8 @@ namespace {
 const Tuned dense_share("stiffness_dense_share", 0.25,
                         "share of nonzero entries from which a dense product is the faster one");
 
-constexpr PetscInt few = 16;  // dofs, of which neither a dense nor an exact product is worth its way
+constexpr PetscInt few = 16;      // dofs, of which a dense product is not worth its way
+constexpr PetscInt coarse = 100;  // dofs of a model whose stiffness is hardly above that of its bending
 
 bool is_dense(Mat A) {
   MatInfo info;
@@ -35,7 +36,7 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
       row_sums_.back()[row - model.first_dof()] += std::abs(value);
     });
     blocked_.emplace_back();
-    blocked_.back().stiffness = term.order == 0 && term.phase == 0 && model.dofs() > few;
+    blocked_.back().cancels = term.order == 0 && term.phase == 0 && model.dofs() > coarse;
     if (!is_dense(term.A)) {
       blocked_.back().sparse.emplace(term.A, h.block_size());
       continue;
@@ -43,7 +44,7 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
     blocked_.back().dense.assign(size_t(model.local_dofs()) * model.dofs(), 0.0);
     for (auto const& entry : entries(term.A))
       blocked_.back().dense[size_t(entry.row - model.first_dof()) * model.dofs() + entry.col] = entry.value;
-    if (blocked_.back().stiffness)
+    if (term.order == 0 && term.phase == 0)
       blocked_.back().split = SplitMatrix(blocked_.back().dense, int(model.local_dofs()), int(model.dofs()));
   }
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
@@ -123,7 +124,7 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked& A, Vec
   const int m = harmonics_.block_size(), local = int(model_.local_dofs()), all = int(model_.dofs());
   if (A.sparse) {
     multiply(harmonics_, c, ReadArray(x).data(), A.sparse->columns(), local);
-    if (!exactly || !A.stiffness) return A.sparse->multiply_add(y);
+    if (!exactly || !A.cancels) return A.sparse->multiply_add(y);
     check(VecSet(work_, 0));
     A.sparse->multiply_exactly(y, work_);
     check(VecAXPY(y, 1, work_));

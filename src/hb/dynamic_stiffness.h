@@ -40,8 +40,8 @@ class DynamicStiffness {
   struct Blocked {
     std::optional<BlockedProduct> sparse;
     std::vector<double> dense;  ///< local rows x all dofs, row-major
-    bool stiffness;             ///< its forces cancel
-    SplitMatrix split;          ///< of a dense one
+    bool cancels;               ///< a sparse stiffness of many dofs
+    SplitMatrix split;          ///< of a dense stiffness
   };
   /// A term whose matrix is so many times that of the product.
   struct Part {

@@ -236,7 +236,7 @@ def test_nothing_is_asked_for_beyond_the_end(comm):
 
     class Listens(TanhLaw):
         def force(self, u, v):
-            if len(u) > 4:  # else samples of it, by themselves
+            if len(u) > 5:  # else samples of it, by themselves
                 asked.append(np.abs(u).max(initial=0.0))
             return super().force(u, v)
 
