@@ -33,6 +33,8 @@ Residual::Residual(model::Model const& model, Harmonics const& h)
 
 Residual::Map Residual::make_map(Mat B, int phase) const {
   Map map{phase, B, {}, factors(phase)};
+  // of one coefficient a dof it is B itself: a static state's motions are rounded as those about it
+  check(MatSetOption(B, MAT_USE_INODES, PETSC_FALSE));
   check(MatCreateMAIJ(B, harmonics_.block_size(), map.B.out()));
   return map;
 }

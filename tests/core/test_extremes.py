@@ -119,6 +119,17 @@ def test_from_a_soft_to_a_bonded_contact(comm, stiffness, square):
 # ---- a blade on two flanks: linear modes at a small amplitude
 
 
+@pytest.mark.parametrize("times", [0.7, 1.05, 1.2, 1.3, 1.5, 2.0])
+def test_a_state_at_rest_balances_its_load_about_small_motions(comm, times):
+    """To the last digits, beside a pair 1e6 times as stiff: rounded otherwise, up to 1e-5 of a motion's force."""
+    model = blade(comm, normal_stiffness=KN * ONE, tangential_stiffness=KT * ONE)
+    first, rest = preloaded(model, times)
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 32), "CNM", TIP, first)
+    problem.preload(rest.displacement, rest.load)
+    mean = problem.residual(problem.initial(1e-6)).array[: model.core.local_dofs * problem.harmonics.block_size]
+    assert np.linalg.norm(mean[:: problem.harmonics.block_size]) < ROUNDING
+
+
 @ROUTES
 @pytest.mark.parametrize(
     "changes, normal, tangential",
