@@ -41,11 +41,7 @@ class PythonLaw : public contact::Law {
     std::vector<double> status(out.status.size()), gap(out.status.size());
     take(states[0], status.size(), status.data());
     take(states[1], gap.size(), gap.data());
-    for (size_t k = 0; k < status.size(); ++k) {
-      if (status[k] != 0 && status[k] != 1 && status[k] != 2)
-        throw nb::value_error("a law in Python returned a status other than STICK, SLIP and OPEN");
-      out.status[k] = contact::Status(int(status[k]));
-    }
+    for (size_t k = 0; k < status.size(); ++k) out.status[k] = contact::Status(int(status[k]));
     if (!out.gap.empty()) out.gap = gap;
   }
 

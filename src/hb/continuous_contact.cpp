@@ -17,13 +17,6 @@ Series sum(Series a, double factor, Series const& b) {
   return a;
 }
 
-/// It is nowhere farther from its mean than that.
-double swing(Series const& p) {
-  double out = 0;
-  for (size_t k = 1; k < p.q.size(); ++k) out += std::abs(p.q[k].real()) + std::abs(p.q[k].imag());
-  return out;
-}
-
 }  // namespace
 
 ContinuousContact::ContinuousContact(Harmonics const& h, contact::Law const& law)
@@ -109,7 +102,7 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
   if (!law.rubs() || !pair.normal.touches()) return;
   const double rest = law.slider[tangent] - now.mean;
   if (pair.normal.closed &&
-      std::abs(rest) + swing(now.u) + swing(now.walls.radius) < now.walls.radius.q[0].real())
+      std::abs(rest) + now.u.bound() + now.walls.radius.bound() < now.walls.radius.q[0].real())
     return now.play.stand(rest);
   now.walls.lower = sum(now.u, -1, now.walls.radius), now.walls.upper = sum(now.u, 1, now.walls.radius);
   const int N = times_.samples(), step = components_ * tile_;

@@ -35,8 +35,9 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
     for_entries(term.A, [&](PetscInt row, PetscInt, double value) {
       row_sums_.back()[row - model.first_dof()] += std::abs(value);
     });
+    const bool stiffness = term.order == 0 && term.phase == 0;
     blocked_.emplace_back();
-    blocked_.back().cancels = term.order == 0 && term.phase == 0 && model.dofs() > coarse;
+    blocked_.back().cancels = stiffness && model.dofs() > coarse;
     if (!is_dense(term.A)) {
       blocked_.back().sparse.emplace(term.A, h.block_size());
       continue;
@@ -44,7 +45,7 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
     blocked_.back().dense.assign(size_t(model.local_dofs()) * model.dofs(), 0.0);
     for (auto const& entry : entries(term.A))
       blocked_.back().dense[size_t(entry.row - model.first_dof()) * model.dofs() + entry.col] = entry.value;
-    if (term.order == 0 && term.phase == 0)
+    if (stiffness)
       blocked_.back().split = SplitMatrix(blocked_.back().dense, int(model.local_dofs()), int(model.dofs()));
   }
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());

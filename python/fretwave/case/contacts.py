@@ -13,7 +13,7 @@ from ..arrays import Array
 from ..errors import FretwaveError, InputError
 from ..model.contact import Contact
 from ..model.law_info import LawInfo
-from ..model.laws import law_like
+from ..model.laws import no_wear
 from ..model.pairs import Pairs
 from ..model.sectors import Sparse
 from ..model.structure import Structure
@@ -53,10 +53,7 @@ def wear_areas(contacts: Sequence[Contact]) -> dict[str, Array]:
         found[contact.name] = areas
     if not found:
         given_laws = ", ".join(str(contact.law) for contact in contacts) or "no contact"
-        fix = f'use law = "{law_like(lambda law: law.wears)}"'
-        raise InputError(
-            "no contact can wear", None, given_laws, "a compiled law of friction along a normal direction", fix
-        )
+        raise no_wear("no contact can wear", None, given_laws)
     return found
 
 

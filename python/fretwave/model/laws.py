@@ -65,6 +65,12 @@ def law_like(wanted: Callable[[LawInfo], bool]) -> str:
     return next(name for name, info in laws().items() if wanted(info))
 
 
+def no_wear(what: str, where: str | None, laws_given: str) -> InputError:
+    """Of contact that is to wear and cannot."""
+    fix = f'use law = "{law_like(lambda law: law.wears)}"'
+    return InputError(what, where, laws_given, "a compiled law of friction along a normal direction", fix)
+
+
 def own_load(contacts: Sequence[Any]) -> str | None:
     """Name of the first parameter by which one of these contacts has a load of its own, for advice in messages."""
     return next(filter(None, (contact.info.named(Role.LOAD) for contact in contacts)), None)

@@ -15,7 +15,7 @@ from ..given import not_negative, numbers
 from ..hb.nonlinear_mode import NonlinearMode
 from ..kinds import of_their_kinds
 from ..model.law_info import Role
-from ..model.laws import law_like
+from ..model.laws import no_wear
 from ..mpi.destroyable import Destroyable, Owned
 from .continuation import Continuation
 from .point import points_of
@@ -112,10 +112,7 @@ class WornMode(Destroyable):
             raise InputError("there is no such contact", None, name, ", ".join(names), "name one of these")
         contact = self.model.contacts[names.index(name)]
         if not contact.info.wears:
-            where, fix = f"contact '{name}'", f'use law = "{law_like(lambda law: law.wears)}"'
-            raise InputError(
-                "a contact cannot wear", where, contact.law, "a compiled law of friction along a normal direction", fix
-            )
+            raise no_wear("a contact cannot wear", f"contact '{name}'", str(contact.law))
 
     def _set_last(self, v: PETSc.Vec, value: float) -> None:
         local = v.getArray()
