@@ -46,6 +46,7 @@ void zhegvd_(int const*, char const*, char const*, int const*, std::complex<doub
              std::complex<double>*, int const*, double*, std::complex<double>*, int const*, double*,
              int const*, int*, int const*, int*);
 void dpotrf_(char const*, int const*, double*, int const*, int*);
+void dpotri_(char const*, int const*, double*, int const*, int*);
 void dsygst_(int const*, char const*, int const*, double*, int const*, double const*, int const*, int*);
 void dtrtri_(char const*, char const*, int const*, double*, int const*, int*);
 void dgeqrf_(int const*, int const*, double*, int const*, double*, double*, int const*, int*);

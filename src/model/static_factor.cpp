@@ -17,6 +17,27 @@ void transpose(double const* in, PetscInt rows, int columns, double* out) {
     for (int k = 0; k < columns; ++k) out[size_t(k) * rows + i] = in[size_t(i) * columns + k];
 }
 
+PetscErrorCode solve_parts(PC pc, Vec x, Vec y) {
+  void* parts;
+  PetscCall(PCShellGetContext(pc, &parts));
+  const ReadArray in(x);
+  const WriteArray out(y);
+  static_cast<Substructures*>(parts)->solve(in.data(), 1, out.data());
+  return PetscErrorCode(0);
+}
+
+void solve_by_parts(Substructures const& parts, Mat B, Mat X, PetscInt local) {
+  PetscInt columns;
+  check(MatGetSize(B, nullptr, &columns));
+  std::vector<double> x(size_t(local) * columns);
+  const DenseArray in(B), out(X);
+  for (PetscInt j = 0; j < columns; ++j)
+    for (PetscInt i = 0; i < local; ++i) x[size_t(i) * columns + j] = in.column(j)[i];
+  parts.solve(x.data(), int(columns), x.data());
+  for (PetscInt j = 0; j < columns; ++j)
+    for (PetscInt i = 0; i < local; ++i) out.column(j)[i] = x[size_t(i) * columns + j];
+}
+
 }  // namespace
 
 MatHandle dense_columns(Mat like, PetscInt columns) {
@@ -32,12 +53,35 @@ MatHandle dense_columns(Mat like, PetscInt columns) {
   return out;
 }
 
-StaticFactor::StaticFactor(Mat K) : K_(MatHandle::share(K)), ksp_(symmetric_factor(K, "static_")) {
+StaticFactor::StaticFactor(Mat K) : K_(MatHandle::share(K)), parts_(Substructures::of(K)) {
   check(MatGetLocalSize(K_, &local_, nullptr));
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(K), &comm_));
+  parts_ ? take_parts() : take_whole();
+}
+
+void StaticFactor::take_whole() {
+  ksp_ = symmetric_factor(K_, "static_");
   definite_ = negative_pivots(ksp_) == 0 && null_pivots(ksp_) == 0;
   megabytes_ = factor_megabytes(ksp_), entries_ = factor_entries(ksp_);
   if (definite_) hold_whole();
+}
+
+void StaticFactor::take_parts() {
+  PC pc;
+  definite_ = parts_->definite(), megabytes_ = parts_->megabytes(), entries_ = parts_->entries();
+  check(KSPCreate(comm_, ksp_.out()));
+  check(KSPSetOperators(ksp_, K_, K_));
+  check(KSPSetType(ksp_, KSPPREONLY));
+  check(KSPGetPC(ksp_, &pc));
+  check(PCSetType(pc, PCSHELL));
+  check(PCShellSetContext(pc, parts_.get()));
+  check(PCShellSetApply(pc, solve_parts));
+}
+
+std::string StaticFactor::divided() const {
+  if (!parts_) return "";
+  return " in " + std::to_string(comm_size(comm_)) + " parts and " + std::to_string(parts_->between()) +
+         " dofs between";
 }
 
 void StaticFactor::hold_whole() {
@@ -52,6 +96,7 @@ void StaticFactor::hold_whole() {
 }
 
 void StaticFactor::solve(Mat B, Mat X) const {
+  if (parts_) return solve_by_parts(*parts_, B, X, local_);
   check(KSPMatSolve(ksp_, B, X));
   expect_factorised(ksp_);
 }
@@ -102,6 +147,7 @@ void StaticFactor::solve_whole(std::vector<double>& parts, std::vector<int> cons
 }
 
 void StaticFactor::solve(double const* x, int coefficients, double* y) const {
+  if (parts_) return parts_->solve(x, coefficients, y);
   if (whole_) return solve_share(x, coefficients, y);
   const MatHandle B = dense_columns(K_, coefficients), X = dense_columns(K_, coefficients);
   PetscInt lead;

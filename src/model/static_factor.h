@@ -1,11 +1,17 @@
 #pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/substructures.h"
 #include "petsc.h"
 
 namespace fretwave::model {
 
-/// L D L^T of a real symmetric stiffness by MUMPS, over all ranks, and solves with many columns at once, each
-/// rank with its dofs of them. A small one is held whole by every rank too, which then solves for its share
-/// of the columns: MUMPS' triangular solves on two ranks take as long as on one.
+/// L D L^T of a real symmetric stiffness by MUMPS, and solves with many columns at once, each rank with its
+/// dofs of them. On several ranks by substructures, where few dofs lie between the ranks; else over all
+/// ranks, and a small one is held whole by every rank too, which then solves for its share of the columns:
+/// MUMPS' triangular solves on two ranks take as long as on one.
 class StaticFactor {
  public:
   /// Factorises. Collective.
@@ -15,14 +21,19 @@ class StaticFactor {
   void solve(double const* x, int coefficients, double* y) const;
   /// X = K^-1 B of dense matrices. Collective.
   void solve(Mat B, Mat X) const;
+  /// Solves with one column, for SLEPc.
   KSP ksp() const { return ksp_; }
   Mat stiffness() const { return K_; }
   PetscInt local_dofs() const { return local_; }
+  /// In words, where it is one of substructures.
+  std::string divided() const;
   /// Of all ranks: what MUMPS took for the factors [MB], and their entries.
   double megabytes() const { return megabytes_; }
   double entries() const { return entries_; }
 
  private:
+  void take_parts();
+  void take_whole();
   void hold_whole();
   void solve_share(double const* x, int coefficients, double* y) const;
   void solve_whole(std::vector<double>& parts, std::vector<int> const& first, int columns) const;
@@ -30,6 +41,7 @@ class StaticFactor {
   MPI_Comm comm_ = MPI_COMM_NULL;
   MatHandle K_, whole_K_;
   KspHandle ksp_, whole_;
+  std::unique_ptr<Substructures> parts_;
   std::vector<PetscInt> first_;  ///< dof of each rank, and the number of all
   PetscInt local_ = 0;
   bool definite_ = false;

@@ -286,8 +286,9 @@ std::string BasisPreconditioner::describe() const {
   const std::string whole =
       blocks + " and " + std::to_string(basis_->size() - basis_->modes()) + " static motions";
   if (!basis_->factor()) return whole;
-  return whole + ", one real factor (" + std::to_string(int(std::ceil(basis_->factor()->megabytes()))) +
-         " MB)";
+  auto const& factor = *basis_->factor();
+  return whole + ", one real factor" + factor.divided() + " (" +
+         std::to_string(int(std::ceil(factor.megabytes()))) + " MB)";
 }
 
 }  // namespace fretwave::precondition

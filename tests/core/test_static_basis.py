@@ -46,16 +46,63 @@ def test_motions_are_those_of_the_direct_route(comm, method, turning):
     solid.assert_same(found, direct)
 
 
+HELD = {  #: dofs between ranks, a share of all, up to which there are substructures, and megabytes held whole
+    "spread": (1e-9, 1e-3),
+    "whole": (1e-9, 1000.0),
+    "substructures": (0.9, 1e-3),
+}
+
+
 @pytest.mark.ranks(2, 3)
-@pytest.mark.parametrize("held", [1e-3, 1000.0])
-def test_ranks_hold_the_factor_in_parts_or_whole(comm, held):
-    """In parts MUMPS solves over all ranks; whole, each rank for its share of the columns. `held` [MB] on all."""
-    with options(fw_static_held=held):
+@pytest.mark.parametrize("kind", HELD)
+def test_ranks_hold_the_factor_in_parts_or_whole(comm, kind):
+    """Spread, MUMPS solves over all ranks; whole, each for its share of the columns; or each has a substructure."""
+    between, held = HELD[kind]
+    with options(fw_static_between=between, fw_static_held=held):
         model, tip = lifting(comm, 0.0)
-        one = solid.mode(model, tip, f"held_{held:g}_", route="krylov", pc_type="fwstatic")
+        one = solid.mode(model, tip, f"held_{kind}_", route="krylov", pc_type="fwstatic")
         found, route = solid.solve(one, [solid.STICK, solid.SLIP])
-    direct, _ = solid.solve(solid.mode(model, tip, f"direct_{held:g}_", route="direct"), [solid.STICK, solid.SLIP])
-    assert "one real factor" in route and found[1]["slip"] > 0.05
+    direct, _ = solid.solve(solid.mode(model, tip, f"direct_{kind}_", route="direct"), [solid.STICK, solid.SLIP])
+    words = rf"one real factor( in {comm.size} parts and \d+ dofs between)? \(\d+ MB\)"
+    assert bool(re.search(words, route)[1]) == (kind == "substructures"), route
+    assert found[1]["slip"] > 0.05 and max(state["iterations"] / state["steps"] for state in found) <= STEPS
+    solid.assert_same(found, direct)
+
+
+@pytest.mark.ranks(2, 3)
+def test_rounding_that_couples_two_substructures_one_way_alone(comm):
+    """An entry of 1e-18 of the stiffness in one triangle: K is symmetric to rounding."""
+    M, K, C, B, tip = solid.structure(solid.SMALL)
+    K = K.tolil()
+    K[0, -1] = K[-1, 3] = 1e-18 * abs(K).max()
+    contact = fw.Contact("coulomb_3d", B, {**solid.STIFFNESS, **solid.LOADS}, "root")
+    with options(fw_static_between=0.9):
+        one = solid.mode(
+            fw.Model(M, K.tocsr(), C, [contact], comm), tip, "one_way_", route="krylov", pc_type="fwstatic"
+        )
+        found, route = solid.solve(one, [solid.SLIP])
+    direct, _ = solid.solve(
+        solid.mode(solid.solid(comm, solid.SMALL)[0], tip, "two_way_", route="direct"), [solid.SLIP]
+    )
+    assert "dofs between" in route
+    solid.assert_same(found, direct)
+
+
+@pytest.mark.ranks(2, 3)
+@pytest.mark.parametrize("numbered", ["along", "at random"])
+def test_substructures_are_sought_where_numbers_do_not_tell_them(comm, numbered):
+    """Of 3660 dofs numbered at random nearly all have a neighbour on another rank: a partition finds the cuts across
+    the bar, 60 dofs each."""
+    M, K, C, B, tip = solid.structure(solid.LARGE)
+    order = np.arange(K.shape[0]) if numbered == "along" else np.random.default_rng(7).permutation(K.shape[0])
+    M, K, C = ((A.tocsr()[order][:, order]) for A in (M, K, C))
+    contact = fw.Contact("coulomb_3d", B[:, order], {**solid.STIFFNESS, **solid.LOADS}, "root")
+    model = fw.Model(M, K, C, [contact], comm)
+    tip = int(np.nonzero(order == tip)[0][0])
+    found, route = solid.solve(solid.mode(model, tip, f"sought_{comm.size}_", pc_type="fwstatic"), [solid.SLIP])
+    parts, between = map(int, re.search(r"in (\d+) parts and (\d+) dofs between", route).groups())
+    assert parts == comm.size and between <= 2 * 60 * (comm.size - 1), route
+    direct, _ = solid.solve(solid.mode(model, tip, f"sought_direct_{comm.size}_", pc_type="fwcondensed"), [solid.SLIP])
     solid.assert_same(found, direct)
 
 
@@ -114,17 +161,25 @@ def problem_with(K, contact, comm):
     return fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", chains.N - 1, start, "refused_")
 
 
-@pytest.mark.parametrize("why", ["a law without a stuck stiffness", "K without symmetry", "K not definite"])
-def test_other_models_are_refused(comm, why):
+REFUSED = ["a law without a stuck stiffness", "K without symmetry", "K not definite", "a free motion"]
+
+
+@pytest.mark.parametrize("between", [1e-9, 0.9])
+@pytest.mark.parametrize("why", REFUSED)
+def test_other_models_are_refused(comm, why, between):
+    """By a factor of all ranks and by substructures, of which no one alone need tell."""
     K = chains.chain()[1] - (5.0 * np.eye(chains.N) if why == "K not definite" else 0.0)
     contact = chains.sliders()
+    if why == "a free motion":
+        K -= np.diag(K.sum(1))
     if why == "K without symmetry":
         K = chains.unsymmetric(K)
     if why == "a law without a stuck stiffness":
         contact = chains.sliders("regularised_coulomb", {"friction_limit": 1.0, "regularisation_velocity": 1e-2})
-    options = PETSc.Options("refused_")
-    options["route"], options["pc_type"] = "krylov", "fwstatic"
-    with pytest.raises(fw.InputError, match="no fwstatic for a model without a basis of stuck pairs"):
+    given = PETSc.Options("refused_")
+    given["route"], given["pc_type"] = "krylov", "fwstatic"
+    named = "no fwstatic for a model without a basis of stuck pairs"
+    with options(fw_static_between=between), pytest.raises(fw.InputError, match=named):
         _core.Newton(problem_with(K, contact, comm).core, "refused_")
 
 
