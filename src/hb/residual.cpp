@@ -20,7 +20,8 @@ Residual::Residual(model::Model const& model, Harmonics const& h)
                        .F = {},
                        .dV = {},
                        .places = {},
-                       .weights = {}});
+                       .weights = {},
+                       .dofs = {}});
     Group& group = groups_.back();
     group.maps.push_back(make_map(contact.B, 0));
     for (auto const& map : contact.ahead) group.maps.push_back(make_map(map.B, map.phase));
@@ -225,24 +226,33 @@ double Residual::mechanical_energy(Vec Q, Exponents const& e) {
   return sum;
 }
 
+/// Of the dof of each weight, on whichever rank. Collective.
+std::vector<double> Residual::of_weights(Group const& group, std::vector<double> const& of_dofs) const {
+  std::vector<double> out(group.weights.size());
+  check(PetscSFBcastBegin(group.dofs, MPI_DOUBLE, of_dofs.data(), out.data(), MPI_REPLACE));
+  check(PetscSFBcastEnd(group.dofs, MPI_DOUBLE, of_dofs.data(), out.data(), MPI_REPLACE));
+  return out;
+}
+
 double Residual::rounding() const {
   const int m = harmonics_.block_size();
-  ReadArray Q(Q_);
+  const ReadArray Q(Q_);
   const auto size = [m](double const* block) {
     double square = 0;
     for (int k = 0; k < m; ++k) square += block[k] * block[k];
     return std::sqrt(square);
   };
+  std::vector<double> moved(model_.local_dofs());
+  for (size_t dof = 0; dof < moved.size(); ++dof) moved[dof] = size(&Q.data()[dof * m]);
   double square = 0;
   for (Group const& group : groups_) {
     contact::Law const& law = *group.contact->law;
     ReadArray F(group.F);
     std::vector<double> motion(group.aft.columns(), 0.0);
-    for (Weight const& w : group.weights) {
-      const PetscInt dof = w.dof - model_.first_dof();  // those of other ranks are left out: an estimate
-      if (dof >= 0 && dof < model_.local_dofs())
-        motion[size_t(w.pair) * law.components() + w.component] +=
-            std::abs(w.value) * size(&Q.data()[dof * m]);
+    const auto of_dofs = of_weights(group, moved);
+    for (size_t k = 0; k < of_dofs.size(); ++k) {
+      Weight const& w = group.weights[k];
+      motion[size_t(w.pair) * law.components() + w.component] += std::abs(w.value) * of_dofs[k];
     }
     for (size_t row = 0; row < motion.size(); ++row) {
       const int pair = int(row) / law.components(), component = int(row) % law.components();

@@ -1,4 +1,6 @@
 #pragma once
+#include <petscsf.h>
+
 #include "hb/aft.h"
 #include "hb/dynamic_stiffness.h"
 
@@ -125,6 +127,7 @@ class Residual {
     };
     std::vector<Place> places;
     std::vector<Weight> weights;
+    Handle<PetscSF, PetscSFDestroy> dofs;  ///< of the weights, on their ranks
     /// Runs body(a, b) for any two weights of the same pair.
     template <class Body>
     void each_couple(Body body) const;
@@ -141,6 +144,7 @@ class Residual {
   double holding(Group const&, int pair, int component) const;
   void transposed_contact_product(Group&, PairTangents const&, Vec dR, Vec dQ);
   void find_weights(Group&);
+  std::vector<double> of_weights(Group const&, std::vector<double> const& of_dofs) const;
   void turn(int row_phase, int col_phase, double* block) const;
   std::vector<complex> factors(int phase) const;
   void contact_pattern(Group&, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);

@@ -21,6 +21,13 @@ void Residual::find_weights(Group& group) {
   }
   std::stable_sort(group.weights.begin(), group.weights.end(),
                    [](auto const& a, auto const& b) { return a.pair < b.pair; });
+  std::vector<PetscInt> dofs;
+  for (Weight const& w : group.weights) dofs.push_back(w.dof);
+  PetscLayout layout;
+  check(MatGetLayouts(group.maps[0].rows, nullptr, &layout));
+  check(PetscSFCreate(model_.comm(), group.dofs.out()));
+  check(PetscSFSetGraphLayout(group.dofs, layout, PetscInt(dofs.size()), nullptr, PETSC_COPY_VALUES,
+                              dofs.data()));
 }
 
 template <class Body>

@@ -25,6 +25,7 @@ from ..units import SI, UnitSystem, unit_system
 from .checks import check_entries, check_inertia
 from .contact import Contact, contact_list
 from .omitted import OmittedModes
+from .pair_owners import Maps, first_dofs, pairs_in_equal_shares, pairs_with_dofs
 from .rest import Rest
 from .sectors import Given, Term, by_sector, check_wave, real_csr
 from .unchanged import Taken
@@ -104,7 +105,8 @@ class Model(Destroyable):
         self._laws: list[Any] = []
         #: The static state that the laws have taken as theirs last.
         self.at_rest: Rest | None = None
-        groups = [self._group(contact) for contact in given]
+        maps = [self._maps(contact) for contact in given]
+        groups = [self._group(*one) for one in zip(given, maps, self._own_pairs(given, maps))]
         self._taken = [Taken(contact) for contact in given]
         theta = 2 * np.pi * nodal_diameter / sectors
         self._core: _core.Model | None = _core.Model(
@@ -168,10 +170,25 @@ class Model(Destroyable):
         local = [self._unit * (units // size + (r < units % size)) for r in range(size)]
         return sum(local[:rank]), sum(local[: rank + 1])
 
-    def _group(self, contact: Contact) -> tuple[str, list[tuple[PETSc.Mat, int]], Any, list[int]]:
-        """The contact's pairs on the rank that owns the pair's first dof."""
-        maps, d = self._maps(contact), contact.components
-        n_rows = maps[0].shape[0]
+    def _own_pairs(self, given: Sequence[Contact], maps: Sequence[Maps]) -> list[npt.NDArray[np.intp]]:
+        first = [first_dofs(of_one, contact.components) for contact, of_one in zip(given, maps)]
+        if self._unit > 1:
+            return pairs_with_dofs(first, *self.ownership)
+        return pairs_in_equal_shares(first, self.comm.rank, self.comm.size) if given else []
+
+    def _group(
+        self, contact: Contact, maps: Maps, pairs: npt.NDArray[np.intp]
+    ) -> tuple[str, list[tuple[PETSc.Mat, int]], Any, list[int]]:
+        d = contact.components
+        self._pairs.append(pairs)
+        rows = (pairs[:, None] * d + np.arange(d)).ravel()
+        parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
+        self._laws.append(contact.core_law(pairs, maps[0].shape[0] // d))
+        return contact.name, parts, self._laws[-1], pairs.tolist()
+
+    def _maps(self, contact: Contact) -> Maps:
+        maps = {k: _entries(B, "B", f"B of contact '{contact.name}'") for k, B in by_sector(contact.B).items()}
+        n_rows, d = maps[0].shape[0], contact.components
         for B in maps.values():
             if B.shape != (n_rows, self.n_dof) or n_rows % d:
                 raise InputError(
@@ -181,28 +198,7 @@ class Model(Destroyable):
                     f"(n_pairs * {d}, {self.n_dof})",
                     "give B as u = B x",
                 )
-        begin, end = self._matrices[0].getOwnershipRange()
-        n_pairs = n_rows // d
-        pairs = np.nonzero((self._first_dofs(maps, d) >= begin) & (self._first_dofs(maps, d) < end))[0]
-        self._pairs.append(pairs)
-        rows = (pairs[:, None] * d + np.arange(d)).ravel()
-        parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
-        self._laws.append(contact.core_law(pairs, n_pairs))
-        return contact.name, parts, self._laws[-1], pairs.tolist()
-
-    @staticmethod
-    def _maps(contact: Contact) -> dict[int, sp.csr_matrix]:
-        where = f"B of contact '{contact.name}'"
-        return {k: _entries(B, "B", where) for k, B in by_sector(contact.B).items()}
-
-    @staticmethod
-    def _first_dofs(maps: Mapping[int, sp.csr_matrix], d: int) -> npt.NDArray[np.intp]:
-        """The first dof that each pair's first row touches, in its own sector if it does."""
-        first = np.zeros(maps[0].shape[0] // d, dtype=np.intp)
-        for B in reversed(list(maps.values())):
-            filled = np.diff(B.indptr)[::d] > 0
-            first[filled] = B.indices[B.indptr[:-1][::d][filled]]
-        return first
+        return maps
 
     def _rows_of(self, B: sp.csr_matrix, rows: npt.NDArray[np.intp]) -> PETSc.Mat:
         begin, end = self._matrices[0].getOwnershipRange()
