@@ -2,9 +2,13 @@
 
 #include <algorithm>
 
+#include "tuned.h"
+
 namespace fretwave::wheel {
 
 namespace {
+
+const Tuned direct("exchange_direct", 5, "ranks up to which each sends to each other by itself");
 
 /// Numbers that travel for another rank: to it in the first stage, from it in the second.
 struct Parcel {
@@ -30,7 +34,11 @@ void for_parcels(std::span<double const> message, Visit visit) {
 }  // namespace
 
 TwoStageExchange::TwoStageExchange(MPI_Comm comm)
-    : comm_(comm), rank_(comm_rank(comm)), size_(comm_size(comm)), columns_(1) {
+    : comm_(comm),
+      rank_(comm_rank(comm)),
+      size_(comm_size(comm)),
+      directly_(size_ <= direct.count()),
+      columns_(1) {
   while (columns_ * columns_ < size_) ++columns_;
   for (int column = 0; column < columns_; ++column) members_.push_back(through(rank_, column));
   for (int r = 0; r < size_; ++r)
@@ -64,12 +72,33 @@ std::vector<TwoStageExchange::Buffer> TwoStageExchange::pass(std::vector<Buffer>
   return in;
 }
 
+/// Without a copy but of what is this rank's own.
+void TwoStageExchange::exchange_directly(std::span<double const> out, std::span<int const> sent,
+                                         std::span<double> in) const {
+  std::vector<MPI_Request> requests;
+  std::span<double const> own;
+  for (int r = 0; r < size_; out = out.subspan(sent[r++])) {
+    if (r == rank_) own = out.first(sent[r]);
+    if (r != rank_) MPI_Isend(out.data(), sent[r], MPI_DOUBLE, r, 1, comm_, &requests.emplace_back());
+  }
+  for (int r = 0; r < size_; ++r) {
+    MPI_Status status;
+    int count = int(own.size());
+    if (r == rank_) {
+      std::ranges::copy(own, in.begin());
+    } else {
+      MPI_Probe(r, 1, comm_, &status);
+      MPI_Get_count(&status, MPI_DOUBLE, &count);
+      MPI_Recv(in.data(), count, MPI_DOUBLE, r, 1, comm_, MPI_STATUS_IGNORE);
+    }
+    in = in.subspan(size_t(count));
+  }
+  MPI_Waitall(int(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+}
+
 void TwoStageExchange::operator()(std::span<double const> out, std::span<int const> sent,
                                   std::span<double> in) const {
-  if (size_ == 1) {
-    std::ranges::copy(out, in.begin());
-    return;
-  }
+  if (directly_) return exchange_directly(out, sent, in);
   std::vector<Buffer> by_column(columns_), by_row(column_.size());
   for (int r = 0; r < size_; out = out.subspan(sent[r++]))
     pack({r, out.first(sent[r])}, by_column[r % columns_]);

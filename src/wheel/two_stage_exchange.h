@@ -8,7 +8,8 @@ namespace fretwave::wheel {
 
 /// What each of p ranks has for each other, in at most 2 sqrt(p) messages of a rank. Ranks stand in rows of
 /// about sqrt(p). A rank sends within its row what goes to any rank of a column to the member in that column,
-/// who then sends within the column what came for each of its ranks, so that every number travels twice.
+/// who then sends within the column what came for each of its ranks, so that every number travels twice. Of
+/// few ranks each sends to each.
 class TwoStageExchange {
  public:
   explicit TwoStageExchange(MPI_Comm);
@@ -28,8 +29,12 @@ class TwoStageExchange {
   std::vector<Buffer> pass(std::vector<Buffer> out, std::vector<int> const& to, std::vector<int> const& from,
                            int tag) const;
 
+  void exchange_directly(std::span<double const> out, std::span<int const> sent, std::span<double> in) const;
+
   MPI_Comm comm_;
-  int rank_, size_, columns_;
+  int rank_, size_;
+  bool directly_;
+  int columns_;
   std::vector<int> members_;  ///< those that this rank sends to first, by column
   std::vector<int> senders_;  ///< those that send to this one first
   std::vector<int> column_;   ///< this rank's column, from the first row

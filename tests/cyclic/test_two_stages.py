@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from models.core_models import options
 
 from fretwave import _core
 
@@ -15,12 +16,16 @@ def numbers(source: int, destination: int, turn: int) -> np.ndarray:
 
 
 @pytest.mark.ranks(1, 2, 3, 4)
+@pytest.mark.parametrize("direct", [1, 5])
 @pytest.mark.parametrize("members", [1, 2, 3, 4])
-def test_all_arrives_in_the_order_of_its_ranks(comm, members):
-    """Also in rows that the number of ranks does not fill, several times in a row and on part of the ranks."""
+def test_all_arrives_in_the_order_of_its_ranks(comm, members, direct):
+    """In two stages and straight; also in rows that the number of ranks does not fill, several times in a row and on
+    part of the ranks."""
     part = comm.Split(comm.rank // members, comm.rank)
     for turn in range(4):
         expected = np.concatenate([numbers(source, part.rank, turn) for source in range(part.size)])
         to = [numbers(part.rank, r, turn) for r in range(part.size)]
-        np.testing.assert_array_equal(_core.exchange(part.py2f(), to, len(expected)), expected)
+        with options(fw_exchange_direct=direct):
+            found = _core.exchange(part.py2f(), to, len(expected))
+        np.testing.assert_array_equal(found, expected)
     part.Free()
