@@ -35,6 +35,19 @@ def shortened(text: str, longest: int = 200) -> str:
     return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
+def number_in(text: str) -> float:
+    """Of a table's field: Python reads 0.1_5 as 0.15, where it is a slip of the hand.
+
+    Raises
+    ------
+    ValueError
+        It is no number.
+    """
+    if "_" in text:
+        raise ValueError(text)
+    return float(text)
+
+
 def counted(number: int, word: str) -> str:
     """``1 dof``, ``2 dofs``."""
     return f"{number} {word}{'s' * (number != 1)}"

@@ -116,3 +116,18 @@ def test_no_module_asks_what_kind_an_analysis_is() -> None:
                 named = [kind for kind in kinds if kind.endswith(SECTIONS)]
                 found += [f"{path.relative_to(PACKAGE)}:{node.lineno}: {kind}" for kind in named]
     assert not found
+
+
+def test_what_stops_it_is_not_told_as_of_a_branch(case: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+    """It takes no steps that could be shorter: `step.minimum` is no key of it."""
+
+    def stops(self, context):
+        writer = context.writer([fw.Column("dofs", "1", "dofs of the model", "i")])
+        writer.append({"dofs": context.model.n_dof})
+        writer.close("stopped", "enough")
+        return fw.Outcome(writer.rows, "enough", False)
+
+    monkeypatch.setattr(Least, "run", stops)
+    assert call("run", case, "--out", tmp_path / "run") == 3
+    told = capsys.readouterr().err
+    assert "enough" in told and "what its reason names" in told and "step" not in told.replace("steps", "")

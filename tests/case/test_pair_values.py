@@ -68,6 +68,7 @@ def test_on_the_command_line(tmp_path: Path, capfd) -> None:
         ("pair,friction_limit\n0,0.5\n1,x\n2,1\n", ("has no such value", "limits.csv:3", "x", "a number >= 0")),
         ("pair,friction_limit\n0,0.5\n1,-1\n2,1\n", ("has no such value", "limits.csv:3", "-1")),
         ("pair,friction_limit\n0,0.5\n1,nan\n2,1\n", ("has no such value", "limits.csv:3", "nan")),
+        ("pair,friction_limit\n0,0.5\n1,0.1_5\n2,1\n", ("has no such value", "limits.csv:3", "0.1_5")),
         ("pair,friction_limit\n0,0.5\n3,1\n2,1\n", ("is of no pair", "limits.csv:3", "pair 3", "0 to 2")),
         ("pair,friction_limit\n0,0.5\n0,1\n2,1\n", ("has a pair again", "limits.csv:3", "pair 0")),
         ("pair,friction_limit\n0,0.5\n1\n", ("ends early", "limits.csv:3", "1 columns")),

@@ -334,4 +334,4 @@ def _short(row: dict[str, Any], unit: str) -> str:
 def _missing_backbones(context: AnalysisContext[ForcedAnalysis]) -> list[str]:
     """Backbones that have no results to compare with (another selection by --only)."""
     missing = [name for name in context.analysis.backbones() if not context.has_results(name)]
-    return [f"distance of the peaks from '{name}' (no results of it in this folder)" for name in missing]
+    return [f"distance of the peaks from '{name}' (no results of it on this model in this folder)" for name in missing]

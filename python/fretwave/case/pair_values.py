@@ -12,7 +12,7 @@ from typing import NoReturn
 import numpy as np
 
 from ..errors import InputError
-from ..texts import display, is_there, names_beside, nearest, shortened
+from ..texts import display, is_there, names_beside, nearest, number_in, shortened
 
 #: A text with this ending is a file with a value for each pair or sector.
 TABLE = ".csv"
@@ -109,7 +109,7 @@ class ValueTable:
     def _number(self, line: int, text: str) -> float:
         value, low, strict = np.nan, self.lower, self.strict
         with suppress(ValueError):
-            value = float(text)
+            value = number_in(text)
         if not np.isfinite(value) or value < low or (strict and value == low):
             bound = f" {'>' if strict else '>='} {low:g}" if low > -1e300 else ""
             self._wrong("has no such value", line, text.strip() or "nothing", f"a number{bound}", "correct the line")

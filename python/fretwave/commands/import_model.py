@@ -39,7 +39,7 @@ from ..mpi.guard import on_first_rank
 from ..results.missing_dof import missing_dof
 from ..results.model_file import DIRECTIONS, write_model
 from ..results.source_file import SourceFile
-from ..texts import display
+from ..texts import display, number_in
 from ..units import SYSTEMS, unknown
 from .import_at_rest import tables_at_rest, write_tables
 
@@ -213,7 +213,7 @@ def _read_table(path: Path) -> IntArray:
 
 def _direction(word: str) -> float:
     name = word.strip().strip('"').lower()
-    return DIRECTIONS.index(name) + 1 if name in DIRECTIONS else float(word)
+    return DIRECTIONS.index(name) + 1 if name in DIRECTIONS else number_in(word)
 
 
 def _names(model: Structure, given: list[str]) -> tuple[list[str], dict[str, int]]:
@@ -290,7 +290,7 @@ def _axis(option: str, text: str | None) -> Array | None:
 
 def _three(option: str, text: str) -> Array:
     try:
-        values = np.array([float(word) for word in text.split(",")])
+        values = np.array([number_in(word) for word in text.split(",")])
         if values.shape == (3,) and np.isfinite(values).all():
             return values
     except ValueError:

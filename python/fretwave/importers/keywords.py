@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import InputError
-from ..texts import display
+from ..texts import display, number_in
 
 #: Keywords whose data lines may stand in a file of their own, which the option INPUT names (Abaqus).
 ELSEWHERE = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "BOUNDARY")
@@ -45,7 +45,7 @@ def number(word: str) -> float:
     ValueError
         It is no number.
     """
-    return float(word.upper().replace("D", "E") or 0)
+    return number_in(word.upper().replace("D", "E") or "0")
 
 
 def _lines(path: Path, above: tuple[Path, ...]) -> Iterator[tuple[str, str]]:

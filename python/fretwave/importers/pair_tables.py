@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..model.pairs import Pairs
-from ..texts import display
+from ..texts import display, number_in
 from .nodes import Nodes
 from .pairs import FAR, Found, joined, reach_of
 from .text import check_heading, doubt_of_end, first_data_line, whole
@@ -84,7 +84,7 @@ def _numbers(line: str, place: str) -> list[float]:
     if len(words) == len(COLUMNS) and not words[-1]:
         words.pop()  # left out
     try:
-        found = [float(word or 0) for word in words]
+        found = [number_in(word or "0") for word in words]
     except ValueError:
         found = []
     if not words[0] or len(found) not in (5, 6) or not np.isfinite(found).all():

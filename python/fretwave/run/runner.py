@@ -270,8 +270,11 @@ class Runner:
         if status == "stopped":
             goal, advice = (str(entry.get(key, "")) for key in ("goal", "advice"))
             outcome = Outcome(int(entry["points"]), str(entry["reason"]), False, goal=goal, advice=advice)
-            self.failures.append(not_converged(name, outcome))
+            self.failures.append(not_converged(name, outcome, self._has_steps(name)))
         return True
+
+    def _has_steps(self, name: str) -> bool:
+        return self.case.analyses[name].harmonic() is not None
 
     def _is_begun(self, name: str) -> bool:
         look = partial(status_of, name, self.folder.path, self.folder.record)
@@ -364,7 +367,7 @@ class Runner:
         }
         on_first_rank(self.comm, self.folder.save)
         if not outcome.converged:
-            self.failures.append(not_converged(name, outcome))
+            self.failures.append(not_converged(name, outcome, self._has_steps(name)))
 
     def _say_left_out(self, names: Sequence[str]) -> None:
         if self.part:

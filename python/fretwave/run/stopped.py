@@ -15,9 +15,12 @@ REACHED = "stop value reached"
 #: A loop may end within itself, and an internal resonance lead to another mode.
 OVER = "steps that pass over loops (--petsc '-fw_branch_other 1e300')"
 
+#: Of an analysis that follows no branch and says nothing itself.
+PLAIN = "what its reason names; --petsc -snes_monitor shows Newton's steps, where it takes any"
 
-def not_converged(name: str, outcome: Outcome) -> NotConverged:
-    """What stopped an analysis, what is kept, and what to try."""
+
+def not_converged(name: str, outcome: Outcome, has_steps: bool = True) -> NotConverged:
+    """What stopped an analysis, what is kept, and what to try: of one without keys of a branch, what it says itself."""
     kept = f"{outcome.points} points are kept" if outcome.points else "nothing was solved, no results written"
     place = f"after point {outcome.points - 1}" if outcome.points else "first point"
     return NotConverged(
@@ -25,7 +28,7 @@ def not_converged(name: str, outcome: Outcome) -> NotConverged:
         where=f"analysis '{name}', {place}",
         measured=outcome.reason,
         expected=outcome.goal or None,
-        fix=outcome.advice or advice(name, outcome.reason),
+        fix=outcome.advice or (advice(name, outcome.reason) if has_steps else PLAIN),
     )
 
 
