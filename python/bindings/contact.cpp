@@ -21,6 +21,7 @@ class PythonLaw : public contact::Law {
   bool odd() const override { return odd_; }
   int normal() const override { return normal_; }
   double stuck_stiffness(int, int) const override { return stuck_stiffness_; }
+  nb::object given() const { return law_; }
 
   void force(contact::Motion const& motion, double* f, contact::Record& record) const override {
     nb::tuple out = nb::cast<nb::tuple>(asked("_evaluate", motion));
@@ -135,6 +136,11 @@ void bind_contact(nb::module_& m) {
       .def_prop_ro("odd", &contact::Law::odd)
       .def_prop_ro("pairs", &contact::Law::pairs)
       .def_prop_ro("sliders", &contact::Law::sliders)
+      .def_prop_ro("in_python",
+                   [](contact::Law const& law) {
+                     auto const* one = dynamic_cast<PythonLaw const*>(&law);
+                     return one ? one->given() : nb::none();
+                   })
       .def("stuck_stiffness", &contact::Law::stuck_stiffness)
       .def("rest",
            [](contact::Law& law, std::vector<double> const& u) {

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from petsc4py import PETSc
 
     from ..model.contact import Contact
+    from ..model.model import Model
     from .harmonic_problem import HarmonicProblem
 
 
@@ -29,6 +30,8 @@ RETURNS = re.compile("comes back to|back onto itself|a closed loop")
 LEADS_OVER = "the motion loses no energy: a mode without damping leads over into another one at internal resonances"
 #: What is said where rounding is no small part of the forces.
 HIDES = "rounding beside the stiffest springs hides"
+#: What is said of a law that gave infinity or nan.
+NO_NUMBER = "gave no number"
 #: Share of the forces that rounding leaves in them, above which steps may find no way on.
 HIDDEN = 3e-8
 #: Contact stiffness over the structure's from which a pair that opens, sticks or slips changes all forces.
@@ -76,6 +79,12 @@ def hidden(problem: HarmonicProblem, y: PETSc.Vec) -> str:
     return f"; {HIDES} {share:.0e} of the forces here" if share > HIDDEN else ""
 
 
+def numberless(model: Model) -> str:
+    """Contacts whose law, one of the user's own, gave no number at a motion that was tried, or nothing. Collective."""
+    told = model.without_numbers()
+    return "".join(f"; the law of contact '{name}' {NO_NUMBER} at {at}" for name, at in told.items())
+
+
 def lossless(problem: HarmonicProblem, y: PETSc.Vec) -> str:
     """That a mode loses no energy at y, where its branch turned back, or nothing. Collective.
 
@@ -90,7 +99,7 @@ def _hardly_slipping(contacts: Sequence[Contact], told: Sequence[dict[str, Any]]
     for contact, one in zip(contacts, told):
         reach = (np.ptp(one["u"], axis=0) * np.ptp(one["f"], axis=0)).sum(axis=0)
         slips = (one["shares"][1] > 0) & (_friction(contact) > 0)
-        if np.any(slips & (np.abs(one["work"]) < VANISHING * reach)):
+        if contact.info.memory and np.any(slips & (np.abs(one["work"]) < VANISHING * reach)):
             names.append(contact.name)
     return names
 

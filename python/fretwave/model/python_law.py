@@ -61,6 +61,7 @@ class PythonLaw:
     stuck_stiffness: float = float("inf")
     pairs: npt.NDArray[np.intp]
     _evaluations: int = 0
+    _no_number: str = ""
 
     def __init__(self, **values: Array) -> None:
         self.__dict__.update(values)
@@ -140,9 +141,19 @@ class PythonLaw:
         return self._evaluations & (self._evaluations - 1) == 0
 
     def _force(self, u: Array, v: Array) -> Array:
-        return np.array(
-            taken(self, "a force", self.force(u, v), u.shape)
-        )  # a law may keep, and fill again, what it gave
+        f = np.array(taken(self, "a force", self.force(u, v), u.shape))  # a law may keep, and fill again, what it gave
+        if not self._no_number and not np.isfinite(f).all():
+            sample, _, pair = np.argwhere(~np.isfinite(f))[0]
+            self._no_number = f"u = {_row(u[sample, :, pair])}, v = {_row(v[sample, :, pair])}"
+        return f
+
+    def take_no_number(self) -> str:
+        """Where it gave a force that is no number [length, length/time], since this was asked last; "" if nowhere.
+
+        A step that goes there is shortened, and no error.
+        """
+        told, self._no_number = self._no_number, ""
+        return told
 
     def _tangents(self, u: Array, v: Array) -> tuple[Array, Array]:
         given = self.tangent(*_copies(u, v))
@@ -160,6 +171,11 @@ class PythonLaw:
         status = taken(self, "a status", self.status(*given), shape)
         check_status(self, status)
         return status, taken(self, "a gap", self.gap(*_copies(u, v, f)), shape)
+
+
+def _row(values: Array) -> str:
+    texts = [f"{value:.4g}" for value in values]
+    return texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
 
 
 def _copies(*values: Array) -> list[Array]:

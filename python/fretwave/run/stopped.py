@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ..analyses.parts.context import Outcome
 from ..errors import NotConverged
-from ..hb.suspects import FREE, HIDES, LEADS_OVER
+from ..hb.suspects import FREE, HIDES, LEADS_OVER, NO_NUMBER
 from ..mpi.petsc_share import prefix_of
 
 #: Of a branch that has come to its end.
@@ -48,6 +48,8 @@ def advice(name: str, reason: str) -> str:
         return "more memory or ranks, fewer harmonics or component modes, or fewer contact pairs"
     if FREE in reason:
         return "hold the structure where contact alone cannot (a spring, an axial stop), or load its contact more"
+    if NO_NUMBER in reason:
+        return "a law that gives a number at any motion, or a range in which the motion stays where it does"
     if "linear solve" in reason or "LINEAR_SOLVE" in reason:
         return f"another start, or shorter steps; --petsc '-ksp_monitor -{prefix_of(name)}snes_monitor' shows why"
     if "overdamped" in reason:

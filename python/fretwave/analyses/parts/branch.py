@@ -13,7 +13,7 @@ from ...case.analysis_tables import StepSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...errors import InputError
-from ...hb.suspects import FREE, RETURNS, TOO_SMALL, hidden, lossless, suspects, vanishing
+from ...hb.suspects import FREE, RETURNS, TOO_SMALL, hidden, lossless, numberless, suspects, vanishing
 from ...mpi.destroyable import Owned
 from ...mpi.log import event
 from ...mpi.spread import Spread
@@ -95,6 +95,7 @@ def suspected(branch: Continuation, stiffness: float, units: UnitSystem) -> str:
     ask = [vanishing, hidden] if branch.reason.startswith(TOO_SMALL) else [lossless] if returned else []
     anchor = branch.anchor
     seen = "".join(one(branch.problem, anchor) for one in ask) if anchor is not None else ""
+    seen += numberless(branch.problem.model)
     return seen + suspects(branch.problem.model.contacts, stiffness, units)
 
 
