@@ -1,10 +1,13 @@
 #pragma once
 #include <algorithm>
-#include <iterator>
+#include <string>
 
 #include "petsc.h"
 
 namespace fretwave {
+
+/// MUMPS gives large counts in millions, with a minus sign.
+inline double large_count(double count) { return count < 0 ? -1e6 * count : count; }
 
 /// What MUMPS' own interface, which lives beside PETSc's, is handled by whatever its numbers are: of
 /// `dmumps_c` or `zmumps_c`, and their structure.
@@ -15,7 +18,7 @@ class Mumps {
 
   /// Entries stay with the ranks that give them. Collective.
   Mumps(MPI_Comm comm, bool symmetric) {
-    id.comm_fortran = MUMPS_INT(MPI_Comm_c2f(comm));
+    id.comm_fortran = MPI_Comm_c2f(comm);
     id.par = 1;
     id.sym = symmetric ? 2 : 0;
     run(begin);
@@ -32,7 +35,7 @@ class Mumps {
   }
   Mumps(Mumps const&) = delete;
 
-  MUMPS_INT& icntl(int k) { return id.icntl[k - 1]; }
+  auto& icntl(int k) { return id.icntl[k - 1]; }
   int status() const { return id.infog[0]; }
   void run(Job job) {
     id.job = job;
@@ -50,19 +53,17 @@ class Mumps {
   void need(std::string const& what) const {
     if (status() >= 0) return;
     if (status() == -13)
-      throw RankFailure("there is not enough memory for the sparse factors",
-                        "MUMPS INFOG(1) = -13, INFOG(2) = " + std::to_string(id.infog[1]),
-                        "use more ranks on more machines, fewer harmonics or a reduced model");
+      throw RankFailure(
+          "there is not enough memory for the sparse factors",
+          "MUMPS INFOG(1) = -13, INFOG(2) = " + std::to_string(id.infog[1]),
+          "use more ranks on more machines, fewer harmonics where each has its own, or a reduced model");
     throw PetscFailure("MUMPS cannot " + what + ": INFOG(1) = " + std::to_string(status()) +
                        ", INFOG(2) = " + std::to_string(id.infog[1]));
   }
   /// Over all ranks [MB].
   double megabytes() const { return id.infog[21]; }
-  /// Of the factors; MUMPS gives large counts in millions, with a minus sign.
-  double entries() const {
-    const double count = id.infog[28];
-    return count < 0 ? -1e6 * count : count;
-  }
+  /// Of the factors.
+  double entries() const { return large_count(id.infog[28]); }
 
   Structure id{};
 };

@@ -48,6 +48,19 @@ def number_in(text: str) -> float:
     return float(text)
 
 
+def whole_in(text: str) -> int:
+    """The same of a whole number.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    if "_" in text:
+        raise ValueError(text)
+    return int(text)
+
+
 def counted(number: int, word: str) -> str:
     """``1 dof``, ``2 dofs``."""
     return f"{number} {word}{'s' * (number != 1)}"

@@ -1,11 +1,10 @@
 #include "model/inertia.h"
 
+#include "mumps.h"
+
 namespace fretwave::model {
 
 namespace {
-
-constexpr double null_pivot =
-    1e-13;  // relative to the scaled matrix; rounding leaves 1e-15 of a rigid motion
 
 Mat factor_of(KSP ksp) {
   PC pc;
@@ -62,11 +61,7 @@ PetscInt negative_pivots(KSP ksp) { return information(ksp, 12); }
 PetscInt null_pivots(KSP ksp) { return information(ksp, 28); }
 double factor_megabytes(KSP ksp) { return information(ksp, 22); }
 
-/// MUMPS gives large counts in millions, with a minus sign.
-double factor_entries(KSP ksp) {
-  const double count = information(ksp, 29);
-  return count < 0 ? -1e6 * count : count;
-}
+double factor_entries(KSP ksp) { return large_count(double(information(ksp, 29))); }
 
 PetscInt count_below(Mat K, Mat M, double lambda, std::string const& prefix) {
   MatHandle A;

@@ -7,6 +7,8 @@ namespace fretwave::model {
 
 /// Workspace beyond MUMPS' own estimate [%] for the pivots that an indefinite matrix delays.
 constexpr PetscInt delayed_pivots = 200;
+/// Pivots over the scaled matrix below which they are none; rounding leaves 1e-15 of a rigid motion.
+constexpr double null_pivot = 1e-13;
 
 /// L D L^T of a symmetric matrix by MUMPS, which also counts negative and null pivots. `PetscFailure` where
 /// there is none. `room`: workspace beyond the estimate [%]. Collective.

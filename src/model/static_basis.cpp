@@ -53,7 +53,9 @@ std::vector<double> lowest_modes(StaticFactor const& factor, Mat M, PetscInt cou
   check(EPSGetST(eps, &st));
   check(STSetKSP(st, factor.ksp()));
   check(EPSSetFromOptions(eps));
-  check(EPSSolve(eps));
+  const PetscErrorCode code = EPSSolve(eps);
+  factor.rethrow();
+  check(code);
   PetscInt converged;
   check(EPSGetConverged(eps, &converged));
   std::vector<double> theta;
@@ -170,7 +172,8 @@ void StuckBasis::add_static(MPI_Comm comm) {
   motions_.assign(r * size_t(k), 0.0);
   add_relative_motion(own_, exactly_.data(), size_t(local_), size_t(k), motions_.data(), r);
   sum_over_ranks(motions_, comm);
-  if (dofs_ * rows <= quicker * factor_->entries()) static_shapes_.resize(r * size_t(local_));
+  keeps_static_ = dofs_ * rows <= quicker * factor_->entries();
+  if (keeps_static_) static_shapes_.resize(r * size_t(local_));
   auto G = contact_compliance(*factor_, own_, rows, comm, static_shapes_);
   lapack::multiply("NT", {rows, rows, k}, -1.0, {motions_.data(), rows}, {motions_.data(), rows}, 1.0,
                    G.data(), rows);
@@ -209,7 +212,7 @@ void StuckBasis::static_motion(double const* g, int coefficients, double* modal,
   for (int j = 0; j < rank; ++j)
     for (int i = 0; i < c; ++i) f[size_t(order[j]) * c + i] = scale[order[j]] * v[size_t(j) * c + i];
   lapack::multiply("NN", {c, k, r}, -1.0, {f.data(), c}, {motions_.data(), r}, 1.0, modal, c);
-  if (!static_shapes_.empty()) {
+  if (keeps_static_) {
     const int lead = lapack::filled_up(c);
     std::vector<float> out(size_t(lead) * local_);
     lapack::multiply("NN", {lead, local_, r}, 1.0f, {lapack::filled_up(f.data(), c, r).data(), lead},

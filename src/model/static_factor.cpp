@@ -9,21 +9,12 @@ namespace fretwave::model {
 namespace {
 
 const Tuned held("static_held", 1000,
-                 "megabytes of the copies of a static factor that all ranks hold, at the most");
+                 "megabytes of what all ranks hold of a static factor each, all copies, at the most");
 
 /// Column-major sight of coefficients that lie innermost, or back.
 void transpose(double const* in, PetscInt rows, int columns, double* out) {
   for (PetscInt i = 0; i < rows; ++i)
     for (int k = 0; k < columns; ++k) out[size_t(k) * rows + i] = in[size_t(i) * columns + k];
-}
-
-PetscErrorCode solve_parts(PC pc, Vec x, Vec y) {
-  void* parts;
-  PetscCall(PCShellGetContext(pc, &parts));
-  const ReadArray in(x);
-  const WriteArray out(y);
-  static_cast<Substructures*>(parts)->solve(in.data(), 1, out.data());
-  return PetscErrorCode(0);
 }
 
 void solve_by_parts(Substructures const& parts, Mat B, Mat X, PetscInt local) {
@@ -53,7 +44,7 @@ MatHandle dense_columns(Mat like, PetscInt columns) {
   return out;
 }
 
-StaticFactor::StaticFactor(Mat K) : K_(MatHandle::share(K)), parts_(Substructures::of(K)) {
+StaticFactor::StaticFactor(Mat K) : K_(MatHandle::share(K)), parts_(Substructures::of(K, held)) {
   check(MatGetLocalSize(K_, &local_, nullptr));
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(K), &comm_));
   parts_ ? take_parts() : take_whole();
@@ -68,14 +59,27 @@ void StaticFactor::take_whole() {
 
 void StaticFactor::take_parts() {
   PC pc;
+  of_parts_.parts = parts_.get();
   definite_ = parts_->definite(), megabytes_ = parts_->megabytes(), entries_ = parts_->entries();
   check(KSPCreate(comm_, ksp_.out()));
+  check(KSPSetOptionsPrefix(ksp_, "static_parts_"));  // SLEPc sets it from options
   check(KSPSetOperators(ksp_, K_, K_));
   check(KSPSetType(ksp_, KSPPREONLY));
   check(KSPGetPC(ksp_, &pc));
   check(PCSetType(pc, PCSHELL));
-  check(PCShellSetContext(pc, parts_.get()));
+  check(PCShellSetContext(pc, &of_parts_));
   check(PCShellSetApply(pc, solve_parts));
+}
+
+PetscErrorCode StaticFactor::solve_parts(PC pc, Vec x, Vec y) {
+  void* context;
+  PetscCall(PCShellGetContext(pc, &context));
+  auto& [parts, guard] = *static_cast<OfParts*>(context);
+  return guard.run([&] {
+    const ReadArray in(x);
+    const WriteArray out(y);
+    parts->solve(in.data(), 1, out.data());
+  });
 }
 
 std::string StaticFactor::divided() const {

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "guard.h"
 #include "model/substructures.h"
 #include "petsc.h"
 
@@ -21,18 +22,20 @@ class StaticFactor {
   void solve(double const* x, int coefficients, double* y) const;
   /// X = K^-1 B of dense matrices. Collective.
   void solve(Mat B, Mat X) const;
-  /// Solves with one column, for SLEPc.
+  /// Solves with one column, for SLEPc; `rethrow` behind it what was thrown meanwhile.
   KSP ksp() const { return ksp_; }
+  void rethrow() const { of_parts_.guard.rethrow(); }
   Mat stiffness() const { return K_; }
   PetscInt local_dofs() const { return local_; }
   /// In words, where it is one of substructures.
   std::string divided() const;
-  /// Of all ranks: what MUMPS took for the factors [MB], and their entries.
+  /// Of all ranks: what the factors took [MB], and their entries.
   double megabytes() const { return megabytes_; }
   double entries() const { return entries_; }
 
  private:
   void take_parts();
+  static PetscErrorCode solve_parts(PC, Vec x, Vec y);
   void take_whole();
   void hold_whole();
   void solve_share(double const* x, int coefficients, double* y) const;
@@ -42,6 +45,11 @@ class StaticFactor {
   MatHandle K_, whole_K_;
   KspHandle ksp_, whole_;
   std::unique_ptr<Substructures> parts_;
+  struct OfParts {
+    Substructures const* parts = nullptr;
+    Guard guard;
+  };
+  mutable OfParts of_parts_;     ///< what the KSP's shell has
   std::vector<PetscInt> first_;  ///< dof of each rank, and the number of all
   PetscInt local_ = 0;
   bool definite_ = false;

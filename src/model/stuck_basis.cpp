@@ -226,7 +226,7 @@ void StuckBasis::motion(double const* g, int coefficients, double* q) const {
 
 double StuckBasis::flops() const {
   if (!factor_) return 4 * dofs_ * size();
-  const double forces = 4 * factor_->entries(), motion = static_shapes_.empty() ? forces : 2 * dofs_ * rows();
+  const double forces = 4 * factor_->entries(), motion = keeps_static_ ? 2 * dofs_ * rows() : forces;
   return 4 * dofs_ * modes_ + 2 * double(rows()) * rows() + forces + motion;
 }
 

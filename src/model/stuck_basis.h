@@ -85,6 +85,7 @@ class StuckBasis {
   std::unique_ptr<StaticFactor> factor_;
   std::vector<ContactEntry> own_;  ///< of B, by this rank's dofs
   /// K_s^-1 B^T where its product takes less time than a solve: rows by this rank's dofs.
+  bool keeps_static_ = false;  ///< on all ranks, also on those without dofs
   std::vector<float> static_shapes_;
   PivotedCholesky triangle_;
 };

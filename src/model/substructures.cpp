@@ -3,6 +3,7 @@
 #include <dmumps_c.h>
 
 #include "lapack.h"
+#include "model/inertia.h"
 #include "mumps.h"
 #include "together.h"
 #include "tuned.h"
@@ -13,8 +14,6 @@ namespace {
 
 const Tuned share_between("static_between", 0.1,
                           "share of dofs between ranks, up to which a static factor is one of substructures");
-constexpr int most_between = 8000;    // their inverse is dense
-constexpr double null_pivot = 1e-13;  // of the diagonal entry that it is left of
 
 /// Dofs that those of later ranks are coupled to, of all ranks, ascending. Collective.
 std::vector<PetscInt> dofs_between(Mat K, MPI_Comm comm) {
@@ -48,7 +47,7 @@ int place(std::vector<PetscInt> const& list, PetscInt dof) {
 
 /// Of the inner dofs, with those touched behind them, whose complement MUMPS makes.
 struct Substructures::Inner : Mumps<DMUMPS_STRUC_C, dmumps_c> {
-  std::vector<int> inner;    ///< this rank's dofs that no other rank's are coupled to
+  std::vector<int> inner;    ///< this rank's dofs that are not between
   std::vector<int> touched;  ///< places of those between that they are coupled to
   std::vector<int> rows, columns, behind;
   std::vector<double> values, complement, right, reduced;
@@ -114,7 +113,7 @@ struct Substructures::Inner : Mumps<DMUMPS_STRUC_C, dmumps_c> {
 
 Substructures::~Substructures() = default;
 
-std::unique_ptr<Substructures> Substructures::of(Mat K) {
+std::unique_ptr<Substructures> Substructures::of(Mat K, double megabytes) {
   MPI_Comm comm;
   PetscInt dofs;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(K), &comm));
@@ -122,7 +121,8 @@ std::unique_ptr<Substructures> Substructures::of(Mat K) {
   if (comm_size(comm) == 1) return nullptr;
   Partition partition(K);
   auto between = dofs_between(partition.matrix(), comm);
-  if (double(between.size()) > std::min(double(most_between), share_between * dofs)) return nullptr;
+  const double of_all = 8e-6 * std::pow(double(between.size()), 2) * comm_size(comm);
+  if (double(between.size()) > share_between * dofs || of_all > megabytes) return nullptr;
   return std::unique_ptr<Substructures>(new Substructures(std::move(partition), std::move(between)));
 }
 
@@ -137,16 +137,24 @@ Substructures::Substructures(Partition partition, std::vector<PetscInt> between)
   partition_.release_matrix();
 }
 
-/// Gives this rank's inner dofs, and what they are coupled to.
-void Substructures::split(Mat K) {
-  factor_ = std::make_unique<Inner>();
-  auto &inner = factor_->inner, &touched = factor_->touched;
-  std::vector<int> number(end_ - begin_, -1), behind(between_.size(), -1);
+/// This rank's inner dofs; the number of each dof among them, -1 where it is between.
+std::vector<int> Substructures::number_inner() {
+  std::vector<int> number(end_ - begin_, -1);
+  auto& inner = factor_->inner;
   for (int dof = 0; dof < int(end_ - begin_); ++dof)
     if (const int there = place(between_, begin_ + dof); there >= 0)
       own_between_.push_back({dof, there});
     else
       number[dof] = int(inner.size()), inner.push_back(dof);
+  return number;
+}
+
+/// Gives the factor this rank's inner dofs, and what they are coupled to.
+void Substructures::split(Mat K) {
+  factor_ = std::make_unique<Inner>();
+  const auto number = number_inner();
+  auto &inner = factor_->inner, &touched = factor_->touched;
+  std::vector<int> behind(between_.size(), -1);
   for_entries(K, [&](PetscInt row, PetscInt column, double a) {
     const int i = number[row - begin_];
     if (i < 0 || a == 0) return;
@@ -174,12 +182,13 @@ std::vector<double> Substructures::diagonal_between(Mat K) const {
 /// S, of both triangles the lower one. Collective.
 std::vector<double> Substructures::condensed(Mat K) const {
   const size_t b = between_.size();
-  std::vector<double> S(b * b);
-  for_entries(K, [&](PetscInt row, PetscInt column, double a) {
-    const int i = place(between_, row), j = i < 0 ? -1 : place(between_, column);
-    if (j >= 0) S[size_t(j) * b + i] += a;
-  });
+  std::vector<double> S;
   together(comm_, "factorising a substructure", [&] {
+    S.resize(b * b);
+    for_entries(K, [&](PetscInt row, PetscInt column, double a) {
+      const int i = place(between_, row), j = i < 0 ? -1 : place(between_, column);
+      if (j >= 0) S[size_t(j) * b + i] += a;
+    });
     if (!factor_) return;
     factor_->factorise();
     auto const& touched = factor_->touched;
@@ -202,10 +211,12 @@ void Substructures::invert(std::vector<double> S, std::vector<double> const& dia
   MPI_Allreduce(MPI_IN_PLACE, &definite, 1, MPI_INT, MPI_MIN, comm_);
   definite_ = definite;
   if (!definite_ || b == 0) return;
-  dpotri_("L", &b, S.data(), &b, &info);
-  lapack::mirror("L", b, S.data());
-  const auto row = [&](int i) { return S.begin() + std::ptrdiff_t(i) * b; };
-  inverse_.assign(row(first_[rank]), row(first_[rank + 1]));
+  together(comm_, "inverting what joins substructures", [&] {
+    dpotri_("L", &b, S.data(), &b, &info);
+    lapack::mirror("L", b, S.data());
+    const auto row = [&](int i) { return S.begin() + std::ptrdiff_t(i) * b; };
+    inverse_.assign(row(first_[rank]), row(first_[rank + 1]));
+  });
 }
 
 void Substructures::measure() {

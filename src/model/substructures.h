@@ -8,8 +8,8 @@
 namespace fretwave::model {
 
 /// The inverse of a real symmetric positive definite matrix by substructures (Przemieniecki, AIAA J. 1, 1963,
-/// p. 138), one a rank. A rank's inner dofs, i, are coupled to no other rank's; b are those between. With
-/// K_ii = L D L^T by MUMPS, of one rank alone,
+/// p. 138), one a rank. A rank's inner dofs, i, are coupled to no inner ones of another rank; b are those
+/// between. With K_ii = L D L^T by MUMPS, of one rank alone,
 ///
 ///     S = K_bb - sum over ranks of K_bi K_ii^-1 K_ib,
 ///     x_b = S^-1 (f_b - sum of K_bi K_ii^-1 f_i),   x_i = K_ii^-1 (f_i - K_ib x_b),
@@ -17,8 +17,9 @@ namespace fretwave::model {
 /// each rank with its own part of all factors and with its rows of S^-1.
 class Substructures {
  public:
-  /// Factorises; none on one rank, or where too many dofs lie between the ranks. Collective.
-  static std::unique_ptr<Substructures> of(Mat K);
+  /// Factorises; none on one rank, or where too many dofs lie between the ranks, of whose S all ranks
+  /// together hold so many megabytes at the most. Collective.
+  static std::unique_ptr<Substructures> of(Mat K, double megabytes);
   ~Substructures();
   bool definite() const { return definite_; }
   /// y = K^-1 x: coefficients, innermost, of this rank's dofs. Collective.
@@ -31,6 +32,7 @@ class Substructures {
  private:
   struct Inner;
   Substructures(Partition, std::vector<PetscInt> between);
+  std::vector<int> number_inner();
   void split(Mat K);
   std::vector<double> condensed(Mat K) const;
   std::vector<double> diagonal_between(Mat K) const;

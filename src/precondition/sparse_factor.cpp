@@ -9,12 +9,12 @@ namespace fretwave::precondition {
 
 struct SparseFactor::Instance : Mumps<ZMUMPS_STRUC_C, zmumps_c> {
   using Mumps::Mumps;
-  void need(char const* what) const {
+  void need_block(char const* what) const {
     if (status() == -10)
       throw SingularBlock(
           "a harmonic block of the preconditioner is singular (MUMPS INFOG(1) = -10 at pivot " +
           std::to_string(id.infog[1]) + "): a free motion at this harmonic");
-    Mumps::need(what + std::string(" a harmonic block"));
+    need(what + std::string(" a harmonic block"));
   }
 };
 
@@ -34,7 +34,7 @@ SparseFactor::SparseFactor(MPI_Comm comm, SparsePattern const& pattern, SparseFa
   if (model) mumps_->icntl(7) = 1;  // given ordering
   mumps_->run(Instance::analyse);
   id.perm_in = nullptr;
-  mumps_->need("analyse");
+  mumps_->need_block("analyse");
 }
 
 SparseFactor::SparseFactor(SparseFactor&&) noexcept = default;
@@ -45,7 +45,7 @@ void SparseFactor::factorise(std::vector<std::complex<double>> values) {
   mumps.id.a_loc = reinterpret_cast<ZMUMPS_COMPLEX*>(values.data());
   mumps.run_factorise();
   mumps.id.a_loc = nullptr;
-  mumps.need("factorise");
+  mumps.need_block("factorise");
 }
 
 void SparseFactor::solve(std::complex<double>* x, int columns, bool transposed) {
@@ -56,7 +56,7 @@ void SparseFactor::solve(std::complex<double>* x, int columns, bool transposed) 
   id.lrhs = id.n;
   mumps_->run(Instance::solve);
   id.rhs = nullptr;
-  mumps_->need("solve with");
+  mumps_->need_block("solve with");
 }
 
 double SparseFactor::megabytes() const { return mumps_->megabytes(); }

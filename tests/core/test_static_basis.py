@@ -49,7 +49,8 @@ def test_motions_are_those_of_the_direct_route(comm, method, turning):
 HELD = {  #: dofs between ranks, a share of all, up to which there are substructures, and megabytes held whole
     "spread": (1e-9, 1e-3),
     "whole": (1e-9, 1000.0),
-    "substructures": (0.9, 1e-3),
+    "substructures": (0.9, 1000.0),
+    "too large": (0.9, 1e-3),
 }
 
 
@@ -67,6 +68,41 @@ def test_ranks_hold_the_factor_in_parts_or_whole(comm, kind):
     assert bool(re.search(words, route)[1]) == (kind == "substructures"), route
     assert found[1]["slip"] > 0.05 and max(state["iterations"] / state["steps"] for state in found) <= STEPS
     solid.assert_same(found, direct)
+
+
+@pytest.mark.ranks(2)
+@pytest.mark.parametrize(
+    "given", [{"pc_type": "none"}, {"ksp_type": "gmres", "pc_type": "jacobi"}], ids=["none", "gmres"]
+)
+def test_options_of_the_users_own_solver_leave_it_alone(comm, given):
+    """Without a prefix: SLEPc set the solver of substructures by them, and iterations went from 24 to 224."""
+    with options(fw_static_between=0.9):
+        model, tip = lifting(comm, 0.0)
+        problem = solid.mode(model, tip, "plain_", route="krylov", pc_type="fwstatic")
+        with options(**given):
+            found, route = solid.solve(problem, [solid.STICK, solid.SLIP])
+    assert "dofs between" in route and max(state["iterations"] / state["steps"] for state in found) <= STEPS
+
+
+@pytest.mark.ranks(4)
+@pytest.mark.parametrize("between", [1e-9, 0.9])
+def test_ranks_without_dofs_take_part(comm, between):
+    """3 dofs on 4 ranks: one waited where the others did not."""
+    K = np.array([[3.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
+    B = np.array([[0.0, 1.0, 0.0]])
+    with options(fw_static_between=between):
+        model = fw.Model(np.eye(3), K, 0.01 * K, [fw.Contact("jenkins", B, chains.SLIDER)], comm)
+        found, route = {}, ""
+        for kind in ("fwstatic", "direct"):
+            given = {"route": "direct"} if kind == "direct" else {"route": "krylov", "pc_type": kind}
+            for name, value in given.items():
+                PETSc.Options()[f"none_{kind}_{name}"] = value
+            first = fw.linear_modes(model, 1, "stuck")[0]
+            problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", 2, first, f"none_{kind}_")
+            found[kind], said = solid.solve(problem, [0.01, 0.3])
+            route = route or said
+    assert "one real factor" in route and found["direct"][1]["slip"] > 0.05
+    solid.assert_same(found["fwstatic"], found["direct"])
 
 
 @pytest.mark.ranks(2, 3)

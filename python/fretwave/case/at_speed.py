@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..model.checks import check_symmetric
 from ..model.sectors import Sparse
 from ..model.structure import SPIN, Structure
+from ..texts import number_in
 from . import matrices
 from .fields import FASTEST, SLOWEST, Matrix
 from .origin import read_file
@@ -134,7 +135,7 @@ def _size(A: Sparse) -> float:
 def square_of(text: str, key: KeyPath, source: Source, found: Found, example: str) -> float | None:
     """Omega^2 [rad^2/s^2]; None of what is no speed."""
     try:
-        speed = float(text)
+        speed = number_in(text)
     except ValueError:
         speed = np.nan
     if SLOWEST <= speed <= FASTEST:

@@ -32,6 +32,8 @@ LEADS_OVER = "the motion loses no energy: a mode without damping leads over into
 HIDES = "rounding beside the stiffest springs hides"
 #: What is said of a law that gave infinity or nan.
 NO_NUMBER = "gave no number"
+#: And what helps.
+NUMBER = "a law that gives a number at any motion, or a range in which the motion stays where it does"
 #: Share of the forces that rounding leaves in them, above which steps may find no way on.
 HIDDEN = 3e-8
 #: Contact stiffness over the structure's from which a pair that opens, sticks or slips changes all forces.

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
-from ..texts import display
+from ..texts import display, number_in
 from .entries import Entries, order_of
 from .text import columns_of, doubt_of_end, first_data_line, head_of, triplets
 
@@ -32,7 +32,7 @@ def looks_like(head: bytes) -> bool:
 def _width(head: bytes) -> int:
     words = re.split(r"[,;\s]+", first_data_line(head).strip())
     try:
-        return len([float(word) for word in words])
+        return len([number_in(word) for word in words])
     except ValueError:
         return 0
 

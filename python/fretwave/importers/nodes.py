@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
-from ..texts import display, nearest
+from ..texts import display, nearest, whole_in
 from .cells import Elements
 from .constraints import Constraints
 from .keywords import Lines, blocks, number, turns_nothing
@@ -215,7 +215,7 @@ class Deck:
             words = [word.strip() for word in text.split(",")]
             try:
                 x, y, z = [number(word) for word in (words[1:4] + ["", "", ""])[:3]]
-                self.rows.append((int(words[0]), x, y, z))
+                self.rows.append((whole_in(words[0]), x, y, z))
             except ValueError:
                 fix = "correct the line"
                 raise InputError("this is no node", place, text, "node, x, y, z", fix) from None

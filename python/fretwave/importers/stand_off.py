@@ -18,6 +18,7 @@ from typing import Optional, TypeVar
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..texts import number_in
 from .keywords import Lines, blocks, number
 from .nodes import Nodes, read_nodes
 from .surfaces import side_of
@@ -77,7 +78,9 @@ def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
             pairs.update(dict.fromkeys(_sides(data), options))
         elif keyword == "CLEARANCE":
             with suppress(ValueError):  # ccx would not have run with it
-                values[options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()] = float(options["VALUE"])
+                values[options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()] = number_in(
+                    options["VALUE"]
+                )
         elif keyword == "SURFACE" and options.get("TYPE", "").upper() == "NODE":
             nodal.add(options.get("NAME", "").upper())
     return {

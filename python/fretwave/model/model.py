@@ -318,10 +318,13 @@ class Model(Destroyable):
         whole: Array = self.comm.bcast(self.gather_pairs(which, local))
         return whole
 
+    def take_no_numbers(self) -> list[str]:
+        """Of each contact where its law, one in Python, gave no number on this rank since this was asked last."""
+        return [law.in_python.take_no_number() if law.in_python is not None else "" for law in self._laws]
+
     def without_numbers(self) -> dict[str, str]:
-        """Contacts whose law, one in Python, gave no number since this was asked last, and where. Collective."""
-        mine = [law.in_python.take_no_number() if law.in_python is not None else "" for law in self._laws]
-        of_ranks = zip(*self.comm.allgather(mine))
+        """The same of all ranks, of contacts whose law did. Collective."""
+        of_ranks = zip(*self.comm.allgather(self.take_no_numbers()))
         found = {contact.name: next(filter(None, told), "") for contact, told in zip(self.contacts, of_ranks)}
         return {name: told for name, told in found.items() if told}
 

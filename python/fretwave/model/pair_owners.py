@@ -27,8 +27,8 @@ def pairs_with_dofs(first: Sequence[Numbers], begin: int, end: int) -> list[Numb
 
 
 def pairs_in_equal_shares(first: Sequence[Numbers], rank: int, size: int) -> list[Numbers]:
-    """A rank's pairs of each contact: of all contacts together as many as other ranks have, first ones at the most one
-    more, by their first dofs."""
+    """A rank's pairs of each contact: of all contacts together as many as other ranks have, or one more, by their first
+    dofs."""
     order = np.argsort(np.concatenate([np.zeros(0, np.intp), *first]), kind="stable")
     mine = np.zeros(len(order), bool)
     begin, end = (-(-len(order) * r // size) for r in (rank, rank + 1))

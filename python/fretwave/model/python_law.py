@@ -143,14 +143,13 @@ class PythonLaw:
     def _force(self, u: Array, v: Array) -> Array:
         f = np.array(taken(self, "a force", self.force(u, v), u.shape))  # a law may keep, and fill again, what it gave
         if not self._no_number and not np.isfinite(f).all():
-            sample, _, pair = np.argwhere(~np.isfinite(f))[0]
-            self._no_number = f"u = {_row(u[sample, :, pair])}, v = {_row(v[sample, :, pair])}"
+            self._no_number = _without_number(u, v, f)
         return f
 
     def take_no_number(self) -> str:
         """Where it gave a force that is no number [length, length/time], since this was asked last; "" if nowhere.
 
-        A step that goes there is shortened, and no error.
+        A step that goes there is shortened, and no error. Continuations ask before each step.
         """
         told, self._no_number = self._no_number, ""
         return told
@@ -171,6 +170,14 @@ class PythonLaw:
         status = taken(self, "a status", self.status(*given), shape)
         check_status(self, status)
         return status, taken(self, "a gap", self.gap(*_copies(u, v, f)), shape)
+
+
+def _without_number(u: Array, v: Array, f: Array) -> str:
+    """The first motion, of numbers itself, of a pair that a law gave none for."""
+    given, found = (np.isfinite(values).all(axis=1) for values in (np.concatenate([u, v], axis=1), f))
+    for sample, pair in np.argwhere(given & ~found)[:1]:
+        return f"u = {_row(u[sample, :, pair])}, v = {_row(v[sample, :, pair])}"
+    return ""
 
 
 def _row(values: Array) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ..analyses.parts.context import Outcome
 from ..errors import NotConverged
-from ..hb.suspects import FREE, HIDES, LEADS_OVER, NO_NUMBER
+from ..hb.suspects import FREE, HIDES, LEADS_OVER, NO_NUMBER, NUMBER
 from ..mpi.petsc_share import prefix_of
 
 #: Of a branch that has come to its end.
@@ -28,8 +28,12 @@ def not_converged(name: str, outcome: Outcome, has_steps: bool = True) -> NotCon
         where=f"analysis '{name}', {place}",
         measured=outcome.reason,
         expected=outcome.goal or None,
-        fix=outcome.advice or (advice(name, outcome.reason) if has_steps else PLAIN),
+        fix=outcome.advice or _without_steps(advice(name, outcome.reason), has_steps),
     )
+
+
+def _without_steps(told: str, has_steps: bool) -> str:
+    return told if has_steps or ".step." not in told else PLAIN
 
 
 def without(name: str, needed: str) -> Outcome:
@@ -48,8 +52,6 @@ def advice(name: str, reason: str) -> str:
         return "more memory or ranks, fewer harmonics or component modes, or fewer contact pairs"
     if FREE in reason:
         return "hold the structure where contact alone cannot (a spring, an axial stop), or load its contact more"
-    if NO_NUMBER in reason:
-        return "a law that gives a number at any motion, or a range in which the motion stays where it does"
     if "linear solve" in reason or "LINEAR_SOLVE" in reason:
         return f"another start, or shorter steps; --petsc '-ksp_monitor -{prefix_of(name)}snes_monitor' shows why"
     if "overdamped" in reason:
@@ -57,6 +59,8 @@ def advice(name: str, reason: str) -> str:
             f"amplitudes at which the mode is damped less (--set {name}.amplitude=...): regularised friction is viscous"
             " at small ones, and bounded at large ones"
         )
+    if NO_NUMBER in reason:
+        return NUMBER
     if "at the start" in reason or "far from the linear mode" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"

@@ -161,6 +161,7 @@ class Continuation:
     def __next__(self) -> Point:
         if self._over:
             raise StopIteration
+        self.problem.model.take_no_numbers()  # of the step to come alone
         with event("FwPoint"):
             point = self._core.next() if self._begun else self._first()
         last, self._begun = self._last, True

@@ -13,7 +13,7 @@ from ..arrays import Array
 from ..errors import InputError, NotConverged
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.harmonics import Harmonics
-from ..hb.suspects import numberless, suspects
+from ..hb.suspects import NUMBER, numberless, suspects
 from ..kinds import of_their_kinds
 from ..model.laws import own_load
 from ..model.model import Model
@@ -190,10 +190,10 @@ def static_preload(
             "no static equilibrium under the full load",
             None,
             f"load factor {0.0 if last is None else last.parameter:.4g}: {reason or branch.reason}"
-            + numberless(model)
+            + (told := numberless(model))
             + suspects(model.contacts, problem.stiffness, model.units),
             "1",
-            "hold the structure where contact alone cannot (an axial stop), or lower the load",
+            NUMBER if told else "hold the structure where contact alone cannot (an axial stop), or lower the load",
         )
 
 
