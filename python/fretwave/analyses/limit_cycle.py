@@ -17,9 +17,10 @@ from ..texts import without_nan
 from .free_decay import TransientSection
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
-from .parts.shifted import shifted_damping
+from .parts.shifted import shifted_damping, twins_of
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from ..case.facts import Facts
     from ..case.reporter import Reporter
 
@@ -36,6 +37,10 @@ class LimitCycleAnalysis(TransientSection):
     summary = CYCLES_IN_TIME
 
     type: Literal["limit_cycle"]
+
+    def beside(self, case: Case) -> list[str]:
+        """Modes that its own is compared with, without their dampers."""
+        return [twin.name for twin in twins_of(self.mode_of(case), case.analyses.of(ModeAnalysis).values())]
 
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)

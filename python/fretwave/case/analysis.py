@@ -96,6 +96,10 @@ class AnalysisSection(Section):
         """Analyses whose results it reads where there are any: they run before it."""
         return []
 
+    def beside(self, case: Case) -> list[str]:
+        """Analyses that its further tables stand beside where there are results of them: they run before it."""
+        return self.compares_with()
+
     def decided_by(self) -> list[str]:
         """Other analyses whose keys decide its results: when one changes, results kept are no longer its own."""
         return []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,8 +72,13 @@ def refuse_sweep(folder: Path, record: Mapping[str, Any]) -> None:
         raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
 
 
-def described(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:
-    """Attributes every group has: the analysis' own keys, and the values that decided its results."""
+def described(analysis: AnalysisSection, case: Case, run_id: str, beside: Sequence[str] = ()) -> dict[str, Any]:
+    """Attributes every group has: the analysis' own keys, and the values that decided its results.
+
+    Parameters
+    ----------
+    beside : analyses with results that its further tables stand beside
+    """
     keys = analysis.model_dump(exclude={"name", "dampers", "petsc", "step", "force", "preload"})
     section = analysis.harmonic()
     observed = section.observed() if section is analysis else None
@@ -83,7 +88,8 @@ def described(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, A
     shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
     reduction = {"reduction": json.dumps({**case.reduced.plain(), **_chosen_for(case)})} if case.reduced else {}
     laws = json.dumps({contact.name: contact.info.plain() for contact in case.contacts})
-    return {**shown, **reduction, "laws": laws, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
+    stamp = _of_tables(case.resolved, _deciding(case, analysis.name).union(beside))
+    return {**shown, **reduction, "laws": laws, "run_id": run_id, "case": json.dumps(stamp)}
 
 
 def _chosen_for(case: Case) -> dict[str, Any]:
@@ -94,9 +100,12 @@ def _chosen_for(case: Case) -> dict[str, Any]:
     return {CHOSEN_FOR: [choice.asked, choice.frequencies, choice.up_to_hz]} if choice else {}
 
 
-def _deciding(case: Case, name: str) -> dict[str, Any]:
-    decisive = (*COMMON, name, *case.analyses[name].decided_by())
-    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in decisive}
+def _deciding(case: Case, name: str) -> set[str]:
+    return {*COMMON, name, *case.analyses[name].decided_by()}
+
+
+def _of_tables(values: Mapping[str, Any], tables: set[str]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if key.split(".")[0] in tables}
 
 
 @dataclass(frozen=True)
@@ -119,22 +128,32 @@ class KeptOn:
 
 
 def kept_on(folder: Path, case: Case, name: str) -> KeptOn | None:
-    """Of results of an analysis that belong to a case as it is before it is reduced; None where there are none."""
+    """Of finished results of an analysis that belong to a case before it is reduced; None where there are none."""
     if not has_results(folder):
         return None
     with open_results(folder / "results.h5") as file:
-        if name not in file or not belongs(file[name], replace(case, reduced=None), name):
+        if not serves(file, replace(case, reduced=None), name):
             return None
         found = json.loads(file[name].attrs.get("reduction", "{}"))
     return KeptOn(found.get("component_modes"), tuple(found.get(CHOSEN_FOR, ())))
 
 
+def stands_beside(folder: Path, case: Case, name: str) -> list[str]:
+    """Analyses with results in a run folder that the further tables of one stand beside. One rank only."""
+    return [one for one in case.analyses[name].beside(case) if has_analysis(folder, case, one)]
+
+
 def has_analysis(folder: Path, case: Case, name: str) -> bool:
-    """Whether there are results of an analysis in a run folder that belong to this very case."""
+    """Whether there are finished results of an analysis in a run folder that belong to this very case."""
     if not has_results(folder):
         return False
     with open_results(folder / "results.h5") as file:
-        return name in file and belongs(file[name], case, name)
+        return serves(file, case, name)
+
+
+def serves(file: Mapping[str, h5py.Group], case: Case, name: str) -> bool:
+    """Whether others may read the results of an analysis: finished ones that belong to the case."""
+    return name in file and file[name].attrs.get("status") != "running" and belongs(file[name], case, name)
 
 
 def belongs(group: h5py.Group, case: Case, name: str) -> bool:
@@ -146,6 +165,6 @@ def belongs(group: h5py.Group, case: Case, name: str) -> bool:
         stored, reduction = json.loads(group.attrs["case"]), json.loads(group.attrs.get("reduction", "{}"))
     except (KeyError, ValueError):
         return False
-    points, modes = group["points"], case.reduced and case.reduced.component_modes
-    same = stored == _deciding(case, name) and modes in (None, reduction.get("component_modes", modes))
-    return bool(same and len(next(iter(points.values()))))
+    points, modes, deciding = group["points"], case.reduced and case.reduced.component_modes, _deciding(case, name)
+    same = _of_tables(stored, deciding) == _of_tables(case.resolved, deciding)
+    return bool(same and modes in (None, reduction.get("component_modes", modes)) and len(next(iter(points.values()))))

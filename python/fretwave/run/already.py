@@ -46,7 +46,7 @@ def check_needed(case: Case, names: Sequence[str], folder: Path, modes: int | No
             found = kept_on(folder, case, needed)
             if found is not None and (modes is None or found.modes in (None, modes)):
                 continue
-            none = f"no results of '{needed}' for this case in {display(folder)}"
+            none = f"no finished results of '{needed}' for this case in {display(folder)}"
             raise InputError(
                 f"'{name}' needs the results of '{needed}'",
                 where="--only",

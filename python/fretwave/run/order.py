@@ -81,7 +81,7 @@ def in_order(case: Case, names: Sequence[str]) -> list[str]:
     def place(name: str) -> None:
         if name in ordered or name not in names:
             return
-        for needed in reads(case.analyses[name]):
+        for needed in [*reads(case.analyses[name]), *case.analyses[name].beside(case)]:
             place(needed)
         ordered.append(name)
 

@@ -12,7 +12,7 @@ from ..analyses.parts.context import AnalysisContext, Outcome, outcome_of
 from ..case import checks
 from ..case.analysis import AnalysisSection
 from ..case.build import model_of
-from ..case.kept import described, reload_case
+from ..case.kept import described, reload_case, stands_beside
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
@@ -293,6 +293,7 @@ class Runner:
             self._start()
 
         case = on_wheel(self.case, analysis)
+        beside = on_first_rank(self.comm, lambda: stands_beside(self.folder.path, self.case, analysis.name))
         built = model_of(case, analysis, self.comm)
         with built as model, options.inserted(), solver_room(case, analysis, prefix):
             context = AnalysisContext(
@@ -305,15 +306,15 @@ class Runner:
                 resuming=self._is_begun(analysis.name),
                 before_first=before_first,
                 attributes={
-                    **described(analysis, self.case, self.folder.record["run_id"]),
+                    **described(analysis, self.case, self.folder.record["run_id"], beside),
                     OVERRIDES: self.options.changing(analysis.name, self.case.analyses),
                 },
             )
             try:
                 outcome = outcome_of(analysis, analysis.run(context))
-            except NotConverged as error:  # before its first point: there was no static state to start from
-                reason = f"{error.what}: {error.measured}"
-                outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
+            except NotConverged as error:  # of a static state to start from, or of another analysis' branch
+                reason, points = f"{error.what}: {error.measured}", context.rows
+                outcome = Outcome(points, reason, False, goal=str(error.expected), advice=error.fix or "")
             unread = self.unread.of_analysis(options)
         self._enough_modes(context, outcome)
         entry = {"left_out": context.left_out, **context.entry}

@@ -13,7 +13,7 @@ import numpy as np
 from ...arrays import Array
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import nodal_diameter, with_flow_forces
-from ...case.kept import belongs, has_analysis
+from ...case.kept import has_analysis, serves
 from ...case.load import Case
 from ...columns import Column, Value, headings
 from ...console import Console
@@ -140,6 +140,11 @@ class AnalysisContext(Generic[Section]):
     @property
     def name(self) -> str:
         return self.analysis.name
+
+    @property
+    def rows(self) -> int:
+        """Rows of its table so far."""
+        return max((writer.rows for writer in self.writers), default=0)
 
     @property
     def units(self) -> UnitSystem:
@@ -277,7 +282,7 @@ class AnalysisContext(Generic[Section]):
         return on_first_rank(self.comm, lambda: self._read(name, lambda group: own_curve(group, self.folder)))
 
     def has_results(self, name: str) -> bool:
-        """Whether an analysis has rows in the run folder that belong to this very case. Collective."""
+        """Whether an analysis has finished results in the run folder that belong to this very case. Collective."""
         return on_first_rank(self.comm, lambda: has_analysis(self.folder, self.case, name))
 
     def write_table(self, suffix: str, columns: Mapping[str, Any], lengths: str = "length") -> None:
@@ -294,11 +299,11 @@ class AnalysisContext(Generic[Section]):
 
     def _read(self, name: str, what: Callable[[h5py.Group], Found]) -> Found:
         with open_results(self.folder / "results.h5") as file:
-            if name not in file or not belongs(file[name], self.case, name):
+            if not serves(file, self.case, name):
                 raise InputError(
                     f"'{self.name}' needs the results of '{name}'",
                     where=display(self.folder),
-                    measured=f"no results of '{name}' for this case",
+                    measured=f"no finished results of '{name}' for this case",
                     fix=f"--only {name},{self.name}",
                 )
             return what(file[name])

@@ -32,7 +32,7 @@ def shifted_damping(
 
     Writes `<name>_shifted_<twin>.csv` with the columns of :func:`_compare`.
     """
-    return [_shift(context, damped, twin) for twin in _twins(context, damped, modes)]
+    return [_shift(context, damped, twin) for twin in twins_of(damped, modes) if context.has_results(twin.name)]
 
 
 def _shift(context: AnalysisContext[AnalysisSection], damped: ModeAnalysis, twin: ModeAnalysis) -> str:
@@ -69,13 +69,11 @@ def _compare(table: Mapping[str, Array], added: Array, damped: ModeCurve) -> lis
     return rows
 
 
-def _twins(
-    context: AnalysisContext[AnalysisSection], damped: ModeAnalysis, others: Iterable[ModeAnalysis]
-) -> list[ModeAnalysis]:
-    """Finished analyses of the same linear mode on the same dof without dampers."""
+def twins_of(damped: ModeAnalysis, others: Iterable[ModeAnalysis]) -> list[ModeAnalysis]:
+    """Analyses of the same linear mode on the same dof without dampers; none of a mode that has none."""
     key = (damped.linear_mode, damped.normalise)
     twins = [other for other in others if not other.dampers and (other.linear_mode, other.normalise) == key]
-    return [twin for twin in twins if damped.dampers and context.has_results(twin.name)]
+    return twins if damped.dampers else []
 
 
 def _or_zero(C: Optional[sp.spmatrix], M: sp.spmatrix) -> sp.spmatrix:
