@@ -7,6 +7,7 @@
     analyses                                  a list, in the order of the case, each with
         name, type, method, status, reason, points, folds, wall_s, overrides
         changed                               what the last run's case has in another way, of results of an earlier one
+        resumes                               is of the last run, with which `fretwave resume` goes on
         unit                                  of amplitudes; wall_s of all points, without start and end of the analysis
         range                                 column, unit, low, high (and cycles of wear)
         peak                                  point (row of <name>.csv) and columns of this row; worn, worn_unit of wear

@@ -17,6 +17,7 @@ from ..results.overview import HEADINGS, Overview, overridden, overviews, status
 from ..results.reader import Run
 from ..results.results import has_results
 from ..results.runfolder import read_record
+from ..results.stamp import stamp_of
 from ..texts import counted, display, own_version
 from ..units import SI
 from . import page
@@ -153,7 +154,8 @@ def _belongs(owner: str, name: str, run: Run) -> bool:
 
 def _analysis(run: Run, record: Mapping[str, Any], one: Overview, images: Sequence[Picture], log: Sequence[str]) -> str:
     analysis, units = run[one.name], _symbols(run)
-    settings = settings_part(one.name, record["case"]["resolved"], one.overrides, units, one.unit)
+    resolved = stamp_of(analysis.attributes) or record["case"]["resolved"]
+    settings = settings_part(one.name, resolved, one.overrides, units, one.unit)
     said = f"Rows of {page.text(one.name)}.csv, counted from 0; ± is the error that the run estimates itself."
     points = points_table(analysis, one)
     return page.section(

@@ -22,7 +22,7 @@ def settings_part(
 
     Parameters
     ----------
-    resolved : of run.json, by address
+    resolved : what decided its results, by address
     overrides : of the command line, as they were typed
     amplitude : unit of the analysis' amplitudes, of those that a key may have
     """

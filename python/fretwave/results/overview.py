@@ -50,6 +50,7 @@ class Overview:
     changed : what the case of the last run has in another way, where these results are of an earlier one
     notes : what else is said, in lines
     peak_beyond : the largest amplitude of a response is at an end of its range
+    resumes : of the last run, with which `fretwave resume` goes on
     """
 
     name: str
@@ -69,6 +70,7 @@ class Overview:
     changed: str = ""
     notes: list[str] = field(default_factory=list)
     peak_beyond: bool = False
+    resumes: bool = True
 
     def cells(self) -> tuple[str, ...]:
         """Its row of the table, under `HEADINGS`."""
@@ -130,7 +132,8 @@ class Overview:
 
     def _ending(self) -> list[str]:
         if self.status == "running":
-            return ["not finished; `fretwave resume` goes on with it when it is cut off"]
+            anew = f"not finished, and not of the last run: `fretwave run CASE --only {self.name}` does it anew"
+            return ["not finished; `fretwave resume` goes on with it when it is cut off" if self.resumes else anew]
         return [f"stopped early: {self.reason}"] if self.status == "stopped" else []
 
 
@@ -139,8 +142,8 @@ def _wave(cycle: Mapping[str, Any]) -> str:
     return f"nodal diameter {cycle['nodal_diameter']}, " if "nodal_diameter" in cycle else ""
 
 
-def overview_of(name: str, group: h5py.Group, resolved: Values = MappingProxyType({})) -> Overview:
-    """Of an analysis' group of the results; `resolved` is the case of the last run in its folder."""
+def overview_of(name: str, group: h5py.Group, record: Values = MappingProxyType({})) -> Overview:
+    """Of an analysis' group of the results; `record` is that of the last run in its folder."""
     table, unit = {key: data[()] for key, data in group["points"].items()}, unit_of_amplitudes(group)
     attributes = group.attrs
     return Overview(
@@ -158,9 +161,10 @@ def overview_of(name: str, group: h5py.Group, resolved: Values = MappingProxyTyp
         wall_s=float(table["wall_s"].sum()) if "wall_s" in table else None,
         limit_cycles=json.loads(attributes.get("events", "[]")),
         overrides=str(attributes.get(OVERRIDES, "")),
-        changed=changed_since(stamp_of(attributes), resolved),
+        changed=changed_since(stamp_of(attributes), record.get("case", {}).get("resolved", {})),
         notes=_landmarks(name, group),
         peak_beyond="over" not in group and _peak_beyond(table),
+        resumes=attributes.get("run_id") == record.get("run_id"),
     )
 
 
@@ -259,8 +263,8 @@ def overviews(folder: Path) -> tuple[str, list[Overview]]:
     """
     with open_results(folder / "results.h5") as file:
         names = [name for name in in_order(folder, list(file)) if "type" in file[name].attrs]
-        resolved = recorded(folder).get("case", {}).get("resolved", {})
-        return str(file.attrs.get("title", "")), [overview_of(name, file[name], resolved) for name in names]
+        record = recorded(folder)
+        return str(file.attrs.get("title", "")), [overview_of(name, file[name], record) for name in names]
 
 
 def in_order(folder: Path, names: list[str]) -> list[str]:

@@ -21,6 +21,7 @@ from ..post.contact_history import ContactHistory
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
 from ..results.parts import PARTS
+from ..results.stamp import changed_since, stamp_of
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
 from .options import ViewOptions
@@ -214,6 +215,11 @@ def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) 
     found = analyses_that_move(file, case)
     if found and asked in (None, *found):
         return asked or found[0]
+    if asked in file and "coefficients" in file[asked] and asked in case.analyses:
+        changed = changed_since(stamp_of(file[asked].attrs), case.resolved)
+        fix = f"`fretwave run {display(case.path)} --only {asked}`, with what else the run was given"
+        what = f"the results of '{asked}' are of the case before it changed"
+        raise InputError(what, display(folder), changed, fix=fix)
     listed = ", ".join(found) or "none"
     raise InputError(
         "there is no motion to show" if asked is None else f"'{asked}' has no motion to show",

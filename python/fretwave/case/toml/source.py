@@ -200,7 +200,7 @@ class Source:
             where=origin,
             measured=f"'{rest[0]}'" if rest[0] not in names else f"'{address}' without a key",
             expected=f"{head}.<key> with one of the names {', '.join(known) or '(none)'}; or model.<key>",
-            fix=self._meant(kind, rest[0], key),
+            fix=self._meant(kind, rest[0], key) or "`fretwave check --keys` lists what may be set",
         )
         self.problems.append(problem)
         return None
