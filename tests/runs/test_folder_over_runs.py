@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from command_line import call
 
 from fretwave.case.load import load_case
 from fretwave.report import report
+from fretwave.results import further
 from fretwave.results.results import AnalysisWriter
 from fretwave.run.order import in_order
 
@@ -135,6 +137,25 @@ def test_motions_of_an_earlier_case_are_not_said_to_be_missing(folder: Path, cap
     assert call("view", folder, "--analysis", "forced") == 2
     told = capfd.readouterr().err
     assert "the results of 'forced' are of the case before it changed" in told and "(now [2.0])" in told
+
+
+def test_tables_of_an_earlier_run_do_not_stay_beside_a_new_one(folder: Path) -> None:
+    old, other = folder / "limit_cycle_shifted_mode.csv", folder / "limit_cycle_of_mine.csv"
+    shutil.copy(old, folder / "forced_time.csv")
+    shutil.copy(old, other)
+    assert old.exists()
+    assert run(folder, "flutter,limit_cycle,forced", contact__damper__friction_limit=4.5, forced__levels=[7.0]) == 0
+    assert not old.exists() and not (folder / "forced_time.csv").exists()  # nothing was compared, no time_points
+    assert other.exists() and (folder / "forced_peaks.csv").exists()
+
+
+def test_every_further_table_is_known() -> None:
+    """Suffixes in the sources."""
+    sources = Path(further.__file__).parents[1] / "analyses"
+    texts = [path.read_text() for path in sources.rglob("*.py")]
+    written = {suffix for text in texts for suffix in re.findall(r'write_table\(f?"(\w+)', text)}
+    assert {"peaks", "time", "shifted_"} <= written
+    assert {one.rstrip("*") for one in further.SUFFIXES} >= written
 
 
 def test_an_address_of_nothing_has_a_way_out(tmp_path: Path, capfd) -> None:

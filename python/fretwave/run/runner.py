@@ -25,6 +25,7 @@ from ..mpi.petsc_options import AnalysisOptions
 from ..mpi.petsc_share import TIME, UNREAD, RunWide, prefix_of
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
+from ..results.further import remove_further
 from ..results.journal import Journal
 from ..results.results import has_results, open_results
 from ..results.runfolder import RunFolder, new_record, peak_memory_mb, results_folder
@@ -291,6 +292,7 @@ class Runner:
         def before_first() -> None:
             options.check_used(_core.unused_options, f"analysis '{analysis.name}'", later)
             self._start()
+            on_first_rank(self.comm, lambda: remove_further(self.folder.path, analysis.name, self.case.analyses))
 
         case = on_wheel(self.case, analysis)
         beside = on_first_rank(self.comm, lambda: stands_beside(self.folder.path, self.case, analysis.name))
