@@ -49,7 +49,7 @@ def number_in(text: str) -> float:
 
 
 def whole_in(text: str) -> int:
-    """The same of a whole number.
+    """The same of a whole number: Python reads 1_2 as 12.
 
     Raises
     ------

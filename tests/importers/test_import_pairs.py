@@ -55,6 +55,8 @@ def test_deck(tmp_path: Path) -> None:
         ("*NODE\n1, 1.\n*ELEMENT, TYPE=C3D8\n1, 1, 2, 3\n", "this is no element"),
         ("*NODE, SYSTEM=C\n1, 1., 0., 0.\n", "not rectangular"),
         ("*NODE\n1, 1., zero, 0.\n", "this is no node"),
+        ("*NODE\n1_2, 1., 0., 0.\n", "this is no node"),
+        ("*NODE\n1, 1.\n*NSET, NSET=A, GENERATE\n1, 1_0\n", "this is no node set"),
         ("*NODE\n1, 1.\n*NODE\n1, 2.\n", "stands twice"),
         ("*NODE\n1, 1.\n*NSET, NSET=A\nB\n", "names 'B'"),
         ("*INSTANCE, NAME=I, PART=P\n0., 0., 1.\n", "an instance is moved"),

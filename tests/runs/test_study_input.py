@@ -61,6 +61,8 @@ def study(folder: Path, *words: str, more: str = "") -> int:
         (["--harmonics", "1,,3"], "whole numbers from 1 up are expected"),
         (["--harmonics", "99999999999"], "whole numbers from 1 up are expected"),
         (["--tolerance", "0,1e-8"], "numbers above 0 are expected"),
+        (["--harmonics", "1_0"], "whole numbers from 1 up are expected"),
+        (["--tolerance", "1e-1_0"], "numbers above 0 are expected"),
         (["--tolerance", "nan"], "numbers above 0 are expected"),
         (["--accuracy", "0"], "numbers above 0 and below 1 are expected"),
         (["--accuracy", "1"], "numbers above 0 and below 1 are expected"),

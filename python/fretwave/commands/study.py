@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.fields import LARGEST_WHOLE
 from ..console import Shown
 from ..run.study import COMPARED, REPEATS, run_study
+from ..texts import number_in, whole_in
 from .parser import Parser, add_force, add_shown
 from .world import world
 
@@ -41,12 +42,14 @@ def _list(kind: type, least: int = 1, below: float = math.inf) -> Any:
     expected = f"whole numbers from {least} up" if kind is int else "numbers above 0"
     expected += f" and below {below:g}" if below < math.inf else ""
 
+    read = whole_in if kind is int else number_in
+
     def fits(value: float) -> bool:
         return least <= value <= LARGEST_WHOLE if kind is int else 0 < value < below
 
     def parse(text: str) -> list[Any]:
         try:
-            values = [kind(part) for part in text.split(",")]
+            values = [read(part) for part in text.split(",")]
         except ValueError:
             values = []
         if not values or not all(map(fits, values)):

@@ -322,6 +322,7 @@ def _generated(first: str, last: str, step: str = "1") -> range:
     ValueError
         It has no members, or a step that does not go upwards.
     """
-    if int(last) < int(first) or int(step) < 1:
+    begin, end, by = (whole_in(word) for word in (first, last, step))
+    if end < begin or by < 1:
         raise ValueError
-    return range(int(first), int(last) + 1, int(step))
+    return range(begin, end + 1, by)

@@ -78,9 +78,8 @@ def read_stand_off(deck: Path) -> dict[Sides, StandOff]:
             pairs.update(dict.fromkeys(_sides(data), options))
         elif keyword == "CLEARANCE":
             with suppress(ValueError):  # ccx would not have run with it
-                values[options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()] = number_in(
-                    options["VALUE"]
-                )
+                sides = options.get("SLAVE", "").upper(), options.get("MASTER", "").upper()
+                values[sides] = number_in(options["VALUE"])
         elif keyword == "SURFACE" and options.get("TYPE", "").upper() == "NODE":
             nodal.add(options.get("NAME", "").upper())
     return {
