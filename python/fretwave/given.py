@@ -146,3 +146,24 @@ def array_of(values: object) -> Array:
         return found.astype(float) if fractions else found
     except (ValueError, OverflowError):
         return np.array(None)
+
+
+def one_a_dof(values: object, n_dof: int) -> Array:
+    """An array (n_dof,) as finite real numbers.
+
+    Raises
+    ------
+    InputError
+        They are none, or not one a dof.
+    """
+    given = array_of(values)
+    measured = "masked entries" if masked(values) else f"{given.shape} of {given.dtype}"
+    expected = f"({n_dof},) finite real numbers"
+    if given.shape == (n_dof,) and given.dtype.kind in "biuf":
+        if (abs(given) <= LARGEST).all():
+            return given.astype(float, copy=False)
+        endless = np.count_nonzero(~np.isfinite(given))
+        measured = f"{endless} entries that are not finite"
+        if not endless:
+            with_a_square("an entry of an array", float(abs(given).max()), "choose other units")
+    raise InputError("an array does not fit the model", None, measured, expected, "give one real number a dof")

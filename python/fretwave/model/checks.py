@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..arrays import Array
 from ..errors import InputError
 from ..given import LARGEST
-from .sectors import Sparse
+from .sectors import Given, Sparse, real_csr
 
 #: Largest entry of A - A^T over the largest entry of A that still counts as rounding.
 SYMMETRY_TOLERANCE = 1e-10
@@ -26,6 +27,22 @@ SINGLE = 1e-6
 
 
 NAMES = {"M": "mass matrix", "K": "stiffness matrix", "C": "damping matrix", "B": "contact map"}
+
+
+def checked_csr(given: Given, letter: str, where: str | None = None) -> sp.csr_matrix:
+    """In CSR form, all of it numbers.
+
+    Raises
+    ------
+    InputError
+        An entry is none.
+    """
+    where = where or letter
+    matrix = real_csr(given, where)
+    wrong = check_entries(letter, matrix, where)
+    if wrong:
+        raise wrong
+    return matrix
 
 
 def check_entries(letter: str, A: Sparse, where: str) -> InputError | None:

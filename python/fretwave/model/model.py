@@ -15,17 +15,17 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..given import LARGEST, array_of, masked, whole, with_a_square
+from ..given import array_of, one_a_dof, whole
 from ..kinds import of_their_kinds
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable, Owned, destroyed
 from ..mpi.gather import on_all_ranks
 from ..texts import shortened
 from ..units import SI, UnitSystem, unit_system
-from .checks import check_entries, check_inertia
+from .checks import check_inertia, checked_csr
 from .contact import Contact, contact_list
 from .omitted import OmittedModes
-from .pair_owners import Maps, first_dofs, pairs_in_equal_shares, pairs_with_dofs
+from .pair_owners import Maps, first_dofs, maps_of, pairs_in_equal_shares, pairs_with_dofs
 from .rest import Rest
 from .sectors import Given, Term, by_sector, check_wave, real_csr
 from .unchanged import Taken
@@ -38,16 +38,6 @@ if MPI.COMM_WORLD.size > 1:
 def _tangents(contact: Contact) -> int:
     """Components beside the normal one."""
     return contact.components - (contact.info.normal is not None)
-
-
-def _entries(given: Given, letter: str, where: str | None = None) -> sp.csr_matrix:
-    """In CSR form, all of it numbers."""
-    where = where or letter
-    matrix = real_csr(given, where)
-    wrong = check_entries(letter, matrix, where)
-    if wrong:
-        raise wrong
-    return matrix
 
 
 class Model(Destroyable):
@@ -105,7 +95,7 @@ class Model(Destroyable):
         self._laws: list[Any] = []
         #: The static state that the laws have taken as theirs last.
         self.at_rest: Rest | None = None
-        maps = [self._maps(contact) for contact in given]
+        maps = [maps_of(contact, self.n_dof) for contact in given]
         groups = [self._group(*one) for one in zip(given, maps, self._own_pairs(given, maps))]
         self._taken = [Taken(contact) for contact in given]
         theta = 2 * np.pi * nodal_diameter / sectors
@@ -149,7 +139,7 @@ class Model(Destroyable):
     def _matrix(self, A: Given, letter: str, ahead: int = 0) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
             return A
-        A = A if isinstance(A, WheelMatrix) else _entries(A, letter)
+        A = A if isinstance(A, WheelMatrix) else checked_csr(A, letter)
         n, columns = A.shape
         if n != columns:
             raise InputError(
@@ -185,20 +175,6 @@ class Model(Destroyable):
         parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
         self._laws.append(contact.core_law(pairs, maps[0].shape[0] // d))
         return contact.name, parts, self._laws[-1], pairs.tolist()
-
-    def _maps(self, contact: Contact) -> Maps:
-        maps = {k: _entries(B, "B", f"B of contact '{contact.name}'") for k, B in by_sector(contact.B).items()}
-        n_rows, d = maps[0].shape[0], contact.components
-        for B in maps.values():
-            if B.shape != (n_rows, self.n_dof) or n_rows % d:
-                raise InputError(
-                    "B does not fit the model",
-                    f"contact '{contact.name}'",
-                    f"{B.shape}",
-                    f"(n_pairs * {d}, {self.n_dof})",
-                    "give B as u = B x",
-                )
-        return maps
 
     def _rows_of(self, B: sp.csr_matrix, rows: npt.NDArray[np.intp]) -> PETSc.Mat:
         begin, end = self._matrices[0].getOwnershipRange()
@@ -257,17 +233,7 @@ class Model(Destroyable):
         InputError
             They are none, or not one a dof.
         """
-        given = array_of(values)
-        measured = "masked entries" if masked(values) else f"{given.shape} of {given.dtype}"
-        expected = f"({self.n_dof},) finite real numbers"
-        if given.shape == (self.n_dof,) and given.dtype.kind in "biuf":
-            if (abs(given) <= LARGEST).all():
-                return given.astype(float, copy=False)
-            endless = np.count_nonzero(~np.isfinite(given))
-            measured = f"{endless} entries that are not finite"
-            if not endless:
-                with_a_square("an entry of an array", float(abs(given).max()), "choose other units")
-        raise InputError("an array does not fit the model", None, measured, expected, "give one real number a dof")
+        return one_a_dof(values, self.n_dof)
 
     def local_inertia(self, q: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
         """This rank's part of M q, from its part of q. Collective."""

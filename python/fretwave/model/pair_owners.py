@@ -1,4 +1,4 @@
-"""Which rank has a contact pair."""
+"""The maps of contact pairs, and which rank has a pair."""
 
 from __future__ import annotations
 
@@ -8,8 +8,36 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..errors import InputError
+from .checks import checked_csr
+from .contact import Contact
+from .sectors import by_sector
+
 Maps = Mapping[int, sp.csr_matrix]  #: B of a contact, by the sector ahead that its dofs are of
 Numbers = npt.NDArray[np.intp]
+
+
+def maps_of(contact: Contact, n_dof: int) -> Maps:
+    """B of a contact.
+
+    Raises
+    ------
+    InputError
+        It does not fit a model of so many dofs, or an entry is no number.
+    """
+    where = f"B of contact '{contact.name}'"
+    maps = {k: checked_csr(B, "B", where) for k, B in by_sector(contact.B).items()}
+    n_rows, d = maps[0].shape[0], contact.components
+    for B in maps.values():
+        if B.shape != (n_rows, n_dof) or n_rows % d:
+            raise InputError(
+                "B does not fit the model",
+                f"contact '{contact.name}'",
+                f"{B.shape}",
+                f"(n_pairs * {d}, {n_dof})",
+                "give B as u = B x",
+            )
+    return maps
 
 
 def first_dofs(maps: Maps, components: int) -> Numbers:
