@@ -255,6 +255,23 @@ def test_a_singular_structure_ends_with_code_3(chain_case, tmp_path, launch, ran
     assert "Traceback" not in done.stderr and "PETSc error" not in done.stderr
 
 
+#: `fretwave`, where Python's collector has not come by the end.
+UNCOLLECTED = """
+import gc, sys
+gc.set_threshold(10**6)
+from fretwave.commands.main import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.ranks(1)
+def test_what_an_exception_holds_on_one_rank_leaves_no_other_waiting(chain_case, tmp_path, launch):
+    """PETSc cleans up as it ends, and waited there for a rank that had objects left: after all was said, for ever."""
+    words = ["run", str(chain_case), "--only", "static", "--no-plots", "--out", str(tmp_path / "run")]
+    words += ["--set", "contact.pads.normal_load=0", "--set", "contact.pads.gap=1e9"]
+    assert launch(2, "-c", UNCOLLECTED, *words, timeout=40.0).returncode == 3
+
+
 @pytest.mark.ranks(1)
 def test_each_analysis_gives_its_reason_and_keeps_its_points(chain_case, tmp_path, capsys):
     """Two analyses stop early; table, results.h5 and `show` work with what was found."""

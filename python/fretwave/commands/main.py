@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import re
 import signal
@@ -36,7 +37,9 @@ def main(arguments: Sequence[str | os.PathLike[str]] | None = None) -> int:
     install()
     _leave_networks_alone()
     with _pipes_break_in_python():
-        return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else _words(arguments)))
+        code = guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else _words(arguments)))
+    gc.collect()  # what an exception held on one rank: as PETSc ends, it waits there for the others
+    return code
 
 
 def _words(given: Sequence[str | os.PathLike[str]]) -> list[str]:
