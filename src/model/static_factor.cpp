@@ -17,16 +17,26 @@ void transpose(double const* in, PetscInt rows, int columns, double* out) {
     for (int k = 0; k < columns; ++k) out[size_t(k) * rows + i] = in[size_t(i) * columns + k];
 }
 
+/// Coefficients, innermost, of this rank's rows into the columns of a dense matrix, and out of them.
+void put_columns(double const* x, PetscInt rows, int columns, Mat A) {
+  const DenseArray to(A);
+  for (PetscInt i = 0; i < rows; ++i)
+    for (int k = 0; k < columns; ++k) to.column(k)[i] = x[size_t(i) * columns + k];
+}
+
+void take_columns(Mat A, PetscInt rows, int columns, double* x) {
+  const DenseArray from(A);
+  for (PetscInt i = 0; i < rows; ++i)
+    for (int k = 0; k < columns; ++k) x[size_t(i) * columns + k] = from.column(k)[i];
+}
+
 void solve_by_parts(Substructures const& parts, Mat B, Mat X, PetscInt local) {
   PetscInt columns;
   check(MatGetSize(B, nullptr, &columns));
   std::vector<double> x(size_t(local) * columns);
-  const DenseArray in(B), out(X);
-  for (PetscInt j = 0; j < columns; ++j)
-    for (PetscInt i = 0; i < local; ++i) x[size_t(i) * columns + j] = in.column(j)[i];
+  take_columns(B, local, int(columns), x.data());
   parts.solve(x.data(), int(columns), x.data());
-  for (PetscInt j = 0; j < columns; ++j)
-    for (PetscInt i = 0; i < local; ++i) out.column(j)[i] = x[size_t(i) * columns + j];
+  put_columns(x.data(), local, int(columns), X);
 }
 
 }  // namespace
@@ -154,20 +164,9 @@ void StaticFactor::solve(double const* x, int coefficients, double* y) const {
   if (parts_) return parts_->solve(x, coefficients, y);
   if (whole_) return solve_share(x, coefficients, y);
   const MatHandle B = dense_columns(K_, coefficients), X = dense_columns(K_, coefficients);
-  PetscInt lead;
-  double* columns;
-  check(MatDenseGetLDA(B, &lead));
-  check(MatDenseGetArrayWrite(B, &columns));
-  for (PetscInt i = 0; i < local_; ++i)
-    for (int k = 0; k < coefficients; ++k) columns[size_t(k) * lead + i] = x[size_t(i) * coefficients + k];
-  check(MatDenseRestoreArrayWrite(B, &columns));
+  put_columns(x, local_, coefficients, B);
   solve(B, X);
-  double const* found;
-  check(MatDenseGetLDA(X, &lead));
-  check(MatDenseGetArrayRead(X, &found));
-  for (PetscInt i = 0; i < local_; ++i)
-    for (int k = 0; k < coefficients; ++k) y[size_t(i) * coefficients + k] = found[size_t(k) * lead + i];
-  check(MatDenseRestoreArrayRead(X, &found));
+  take_columns(X, local_, coefficients, y);
 }
 
 }  // namespace fretwave::model

@@ -228,18 +228,12 @@ void Substructures::measure() {
 
 /// Coefficients, innermost, of forces on the dofs between, which they move. Collective.
 void Substructures::move_between(std::vector<double>& x, int coefficients) const {
-  const int rank = comm_rank(comm_), ranks = comm_size(comm_), b = int(between_.size()), c = coefficients;
-  std::vector<int> counts(ranks), from(ranks);
-  for (int r = 0; r < ranks; ++r) {
-    counts[r] = as_int(PetscInt64(c) * (first_[r + 1] - first_[r]), "coefficients of dofs between ranks");
-    from[r] = as_int(PetscInt64(c) * first_[r], "coefficients of dofs between ranks");
-  }
+  const int rank = comm_rank(comm_), b = int(between_.size()), c = coefficients;
+  const int rows = first_[rank + 1] - first_[rank];
   sum_over_ranks(x, comm_);
-  std::vector<double> own(counts[rank]);
-  lapack::multiply("NN", {c, first_[rank + 1] - first_[rank], b}, 1.0, {x.data(), c}, {inverse_.data(), b},
-                   0.0, own.data(), c);
-  MPI_Allgatherv(own.data(), counts[rank], MPI_DOUBLE, x.data(), counts.data(), from.data(), MPI_DOUBLE,
-                 comm_);
+  std::vector<double> own(size_t(c) * rows);
+  lapack::multiply("NN", {c, rows, b}, 1.0, {x.data(), c}, {inverse_.data(), b}, 0.0, own.data(), c);
+  x = gathered(std::span<double const>(own), comm_);
 }
 
 void Substructures::solve(double const* x, int coefficients, double* y) const {

@@ -38,7 +38,8 @@ def main(arguments: Sequence[str | os.PathLike[str]] | None = None) -> int:
     _leave_networks_alone()
     with _pipes_break_in_python():
         code = guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else _words(arguments)))
-    gc.collect()  # what an exception held on one rank: as PETSc ends, it waits there for the others
+    if launched():
+        gc.collect()  # what an exception held on one rank: as PETSc ends, it waits there for the others
     return code
 
 
