@@ -83,6 +83,14 @@ void give_memory_back() {
 #endif
 }
 
+/// petsc4py ends PETSc as Python ends, which waits on each rank for others that have objects left. Cycles of
+/// Python's hold them, an exception's frames above all, on one rank and not on another: they are collected
+/// before, for what is registered last is called first.
+void collect_before_petsc_ends() {
+  if (comm_size(PETSC_COMM_WORLD) == 1) return;
+  nb::module_::import_("atexit").attr("register")(nb::module_::import_("gc").attr("collect"));
+}
+
 /// beta C + alpha B A, or B^T A, of few columns, by rows; into C.
 template <class Real>
 void flat_product_added(Rows<Real> B, Rows<Real> A, bool transposed, Real alpha, Real beta,
@@ -115,6 +123,7 @@ void begin_log(bool nested) {
 
 NB_MODULE(_core, m) {
   import_petsc4py_module();  // initialises PETSc
+  collect_before_petsc_ends();
   give_memory_back();
   mend_blas_kernels();
   check(SlepcInitializeNoArguments());

@@ -272,6 +272,36 @@ def test_what_an_exception_holds_on_one_rank_leaves_no_other_waiting(chain_case,
     assert launch(2, "-c", UNCOLLECTED, *words, timeout=40.0).returncode == 3
 
 
+#: A script that catches an error, which a cycle holds on the first rank alone.
+CAUGHT = """
+import gc
+gc.set_threshold(10**6)
+import numpy as np
+from mpi4py import MPI
+import fretwave as fw
+
+def load_what_is_free():
+    free = np.diag([1.0, 2.0, 1.0]) - np.eye(3, k=1) - np.eye(3, k=-1)
+    regularised = {"friction_limit": 1.0, "regularisation_velocity": 0.1}
+    pad = fw.Contact("regularised_coulomb", B=[[0.0, 0.0, 1.0]], parameters=regularised)
+    model = fw.Model(np.eye(3), free, contacts=[pad])
+    try:
+        fw.static_preload(model, np.ones(3))
+    except fw.NotConverged as error:
+        if MPI.COMM_WORLD.rank == 0:
+            held = [error]  # whose frames hold it
+        print("caught", flush=True)
+
+load_what_is_free()
+"""
+
+
+@pytest.mark.ranks(1)
+def test_what_a_script_has_caught_on_one_rank_leaves_no_other_waiting(launch):
+    done = launch(2, "-c", CAUGHT, timeout=40.0)
+    assert done.returncode == 0 and done.stdout.split() == ["caught", "caught"], done.stderr
+
+
 @pytest.mark.ranks(1)
 def test_each_analysis_gives_its_reason_and_keeps_its_points(chain_case, tmp_path, capsys):
     """Two analyses stop early; table, results.h5 and `show` work with what was found."""

@@ -146,3 +146,22 @@ def test_what_is_solved_in_another_way_is_of_the_same_model(changed: Path) -> No
         assert f"mode.{key}" in own
         mode.attributes["case"] = json.dumps({**stamp, f"mode.{key}": value})
         assert of_one_model(decay, mode) is same
+
+
+def test_a_study_or_a_sweep_does_not_hide_a_run(folder, capsys):
+    """`show` takes a folder for one of them: the run's results were there, and nothing told of them."""
+    study = ["study", CASE, "--analysis", "mode", "--harmonics", "3,5", "--repeats", "1", "--quick"]
+    sweep = ["sweep", CASE, *SHORT, "--over", "mode.harmonics=3,5"]
+    for words in (study, sweep):
+        assert call(*words, "--out", folder) == 2
+        said = capsys.readouterr().err
+        assert "results of another kind" in said and "a run" in said and "--force" in said
+    assert call("show", folder) == 0
+    assert "0.02" in capsys.readouterr().out
+
+
+def test_a_run_does_not_take_a_sweeps_folder(tmp_path, capsys):
+    assert call("sweep", CASE, *SHORT, "--over", "mode.harmonics=3,5", "--out", tmp_path) == 0
+    assert call("run", CASE, *SHORT, "--out", tmp_path) == 2
+    assert "a sweep" in capsys.readouterr().err
+    assert call("run", CASE, *SHORT, "--out", tmp_path, "--force") == 0

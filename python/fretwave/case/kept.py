@@ -53,7 +53,7 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
             where=display(path),
             measured="; ".join(changed[:5]) + (f"; and {len(changed) - 5} more" if len(changed) > 5 else ""),
             expected=f"the case as kept in {display(folder / CASE_COPY)}",
-            fix=f"change it back, or start anew with `fretwave run {display(path)}`",
+            fix=f"change it back, or start anew with `fretwave run {display(path)} --out {display(folder)}`",
         )
     return case, record
 

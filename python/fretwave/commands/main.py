@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import gc
 import os
 import re
 import signal
@@ -37,10 +36,7 @@ def main(arguments: Sequence[str | os.PathLike[str]] | None = None) -> int:
     install()
     _leave_networks_alone()
     with _pipes_break_in_python():
-        code = guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else _words(arguments)))
-    if launched():
-        gc.collect()  # what an exception held on one rank: as PETSc ends, it waits there for the others
-    return code
+        return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else _words(arguments)))
 
 
 def _words(given: Sequence[str | os.PathLike[str]]) -> list[str]:

@@ -48,6 +48,11 @@ def _expect_folder(folder: Path) -> None:
     expect_writable(folder)
 
 
+def _kind(record: Mapping[str, Any]) -> str:
+    """What ``show`` takes a folder for."""
+    return next((f"a {kind}" for kind in ("sweep", "study") if kind in record), "a run")
+
+
 class RunFolder:
     """Keeps the record of one run. Only the rank with `active` writes.
 
@@ -85,27 +90,33 @@ class RunFolder:
         self.started = False
 
     def check_free(self) -> None:
-        """Refuse a folder that another run has, or results of another case. One rank only."""
+        """Refuse a folder that another run has, results of another case, or of another kind. One rank only."""
         check_free(self.path)
-        other = None if self._force else self._other_case()
+        if self._force:
+            return
+        fix = "choose another folder with --out, or replace the results with --force"
+        other, earlier = self._other_case(), self._earlier()
         if other is not None:
-            raise InputError(
-                "this folder holds the results of another case",
-                display(self.path),
-                display(Path(other["path"])),
-                display(Path(self.record["case"]["path"])),
-                "choose another folder with --out, or replace the results with --force",
-            )
+            measured, expected = (display(Path(case["path"])) for case in (other, self.record["case"]))
+            what = "this folder holds the results of another case"
+            raise InputError(what, display(self.path), measured, expected, fix)
+        if earlier is not None and _kind(earlier) != _kind(self.record):
+            what = "this folder holds results of another kind, which would not be shown any more"
+            raise InputError(what, display(self.path), _kind(earlier), _kind(self.record), fix)
 
-    def _other_case(self) -> dict[str, Any] | None:
-        """How the case was given whose results are here, if it is another file with another content."""
-        own = self.record["case"]
+    def _earlier(self) -> dict[str, Any] | None:
+        """Record of another run that this one takes the folder of; None of a damaged one."""
         if self._resumed or "part_of" in self.record or not (self.path / RECORD).exists():
             return None
         try:
-            earlier: dict[str, Any] = read_record(self.path)["case"]
+            return read_record(self.path)
         except InputError:
-            return None  # a damaged record says nothing of its case
+            return None
+
+    def _other_case(self) -> dict[str, Any] | None:
+        """How the case was given whose results are here, if it is another file with another content."""
+        own, record = self.record["case"], self._earlier()
+        earlier: dict[str, Any] = record["case"] if record is not None else own
         return None if earlier["path"] == own["path"] or earlier.get("digest") == own["digest"] else earlier
 
     def start(self) -> None:
