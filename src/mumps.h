@@ -41,6 +41,23 @@ class Mumps {
     id.job = job;
     call(&id);
   }
+  /// What users set of it by PETSc's names for its numbers, -<prefix>mat_mumps_icntl_<k> and cntl; not what
+  /// says where entries and right sides lie, and what is solved for.
+  void take_options(std::string const& prefix) {
+    constexpr int ours[] = {5, 18, 19, 20, 21, 26, 30, 31, 32};
+    PetscBool given;
+    for (int k = 1; k <= 40; ++k) {
+      if (std::ranges::count(ours, k) > 0) continue;
+      PetscInt value = icntl(k);
+      const auto name = "-mat_mumps_icntl_" + std::to_string(k);
+      check(PetscOptionsGetInt(nullptr, prefix.c_str(), name.c_str(), &value, &given));
+      icntl(k) = int(value);
+    }
+    for (int k = 1; k <= 7; ++k) {
+      const auto name = "-mat_mumps_cntl_" + std::to_string(k);
+      check(PetscOptionsGetReal(nullptr, prefix.c_str(), name.c_str(), &id.cntl[k - 1], &given));
+    }
+  }
   /// Again with more workspace, where that was short.
   void run_factorise() {
     constexpr int workspace_short[] = {-8, -9, -14, -15, -17, -20};  // INFOG(1)

@@ -56,6 +56,7 @@ struct Substructures::Inner : Mumps<DMUMPS_STRUC_C, dmumps_c> {
     icntl(13) = 1;  // no ScaLAPACK root, or its pivots are not counted
     icntl(24) = 1;  // null pivots are counted
     id.cntl[2] = null_pivot;
+    take_options("static_");
   }
   bool definite() const { return id.infog[11] == 0 && id.infog[27] == 0; }
 

@@ -84,6 +84,19 @@ def test_options_of_the_users_own_solver_leave_it_alone(comm, given):
     assert "dofs between" in route and max(state["iterations"] / state["steps"] for state in found) <= STEPS
 
 
+@pytest.mark.ranks(2)
+def test_options_of_mumps_steer_substructures_too(comm):
+    """By the names that they have on one rank; what is not the user's to say is left unread, and told."""
+    with options(fw_static_between=0.9, static_mat_mumps_icntl_7=0, static_mat_mumps_icntl_20=1):
+        model, tip = lifting(comm, 0.0)
+        found, route = solid.solve(
+            solid.mode(model, tip, "steered_", route="krylov", pc_type="fwstatic"), [solid.STICK, solid.SLIP]
+        )
+        unread = [name for name in _core.unused_options() if name.startswith("static_")]
+    assert "dofs between" in route and unread == ["static_mat_mumps_icntl_20"]
+    assert max(state["iterations"] / state["steps"] for state in found) <= STEPS
+
+
 @pytest.mark.ranks(4)
 @pytest.mark.parametrize("between", [1e-9, 0.9])
 def test_ranks_without_dofs_take_part(comm, between):
