@@ -229,6 +229,13 @@ def test_friction_at_rest_is_a_viscous_damper(comm):
     check_quadratic_modes(fw.linear_modes(model, 3, "linearised"), M3, C3 + 0.15 * B.T @ B, K3)
 
 
+def test_laws_with_memory_stick_at_rest(comm):
+    """A Jenkins slider of 3 N/m on 1 N/m: omega^2 = 4 - (c/2)^2, and not of the spring alone."""
+    slider = fw.Contact("jenkins", [[1.0]], {"tangential_stiffness": 3.0, "friction_limit": 1.0})
+    mode = fw.linear_modes(fw.Model([[1.0]], [[1.0]], [[0.2]], [slider], comm), 1, "linearised")[0]
+    assert (mode.beta, mode.omega) == pytest.approx((0.1, np.sqrt(4 - 0.1**2)), rel=SOLVED)
+
+
 def test_damping_ratio_and_frequency_of_a_single_dof(comm):
     """lambda = -c/(2m) +- i sqrt(k/m - c^2/(4m^2))."""
     m, k, c = 2.0, 50.0, 0.8
