@@ -138,6 +138,8 @@ def test_wrong_faces_are_refused():
 def test_one_sided_coupling_is_refused():
     refused("one-sided.*no counterpart", fw.Sector, [[1.0]], {0: [[2.0]], 1: [[-1.0]]}, 5)
     refused("one-sided.*not zero", fw.Sector, [[1.0]], {0: [[2.0]], 1: [[-1.0]], -1: [[-0.5]]}, 5)
+    refused("K of the sector itself is not symmetric.*0.25 of the largest", fw.Sector, np.eye(2), [[4, 1], [2, 4]], 5)
+    refused("M of the sector itself is not symmetric", fw.Sector, [[4, 1], [2, 4]], np.eye(2), 5)
     refused("two sectors or more", fw.Sector, [[1.0]], [[2.0]], 1)
     refused("own sector's matrix", fw.Sector, [[1.0]], {1: [[2.0]]}, 5)
 

@@ -186,6 +186,16 @@ def check_balanced(given: Term | None, name: str) -> None:
     for k, A in parts.items():
         other = parts.get(-k)
         wrong = other is None or (name != "C" and abs(A - other.T).max() > 1e-9 * max(abs(A).max(), abs(other).max()))
+        if wrong and k == 0:
+            difference = abs(A - A.T).max() / abs(A).max()
+            raise InputError(
+                f"{name} of the sector itself is not symmetric",
+                f"{name}[0]",
+                f"{name}[0] - {name}[0].T up to {difference:.3g} of the largest entry",
+                f"{name}[0] = {name}[0].T within 1e-9",
+                f"correct the entry, or use ({name} + transpose)/2 if this is rounding"
+                + ("; forces of the flow are aerodynamics" if name == "K" else ""),
+            )
         if wrong:
             raise InputError(
                 f"the coupling of {name} between sectors is one-sided",
