@@ -1,87 +1,139 @@
 #include "model/partition.h"
 
-#include "together.h"
+#include <functional>
+
+#include "model/dof_graph.h"
 
 namespace fretwave::model {
 
 namespace {
 
-constexpr double near = 0.05;  // of a part: how far a cut may lie from that of equal parts
+constexpr double near = 0.05;      // of a part: how far a cut may lie from that of equal parts
+constexpr int most_steps = 10000;  // along the graph, each a message to neighbours and a sum over all ranks
 
-/// Rows and columns of all ranks, on the first one. Collective.
-MatHandle on_first_rank(Mat A, MPI_Comm comm) {
-  IsHandle all;
-  PetscInt size;
-  Mat* made;
-  check(MatGetSize(A, &size, nullptr));
-  check(ISCreateStride(PETSC_COMM_SELF, comm_rank(comm) == 0 ? size : 0, 0, 1, all.out()));
-  const IS rows = all;
-  check(MatCreateSubMatrices(A, 1, &rows, &rows, MAT_INITIAL_MATRIX, &made));
-  auto out = MatHandle::share(made[0]);
-  check(MatDestroySubMatrices(1, &made));
+/// Sums of all entries up to each. Collective.
+void add_up(Vec v, MPI_Comm comm) {
+  const WriteArray own(v);
+  std::partial_sum(own.span().begin(), own.span().end(), own.data());
+  const double mine = own.span().empty() ? 0 : own.span().back();
+  double before = 0;
+  MPI_Exscan(&mine, &before, 1, MPI_DOUBLE, MPI_SUM, comm);
+  if (comm_rank(comm) > 0)
+    for (double& one : own.span()) one += before;
+}
+
+/// For each dof of this rank its place among all of them.
+using Places = std::vector<PetscInt>;
+
+Places as_numbered(DofGraph const& graph, PetscInt begin) {
+  Places out(graph.size());
+  std::iota(out.begin(), out.end(), begin);
   return out;
 }
 
-/// Dofs by levels of their graph, from one end of it to the other (Cuthill & McKee 1969).
-std::vector<PetscInt> from_end_to_end(Mat A) {
-  IsHandle rows, columns;
-  PetscInt const* numbers;
-  PetscInt size;
-  check(MatGetOrdering(A, MATORDERINGRCM, rows.out(), columns.out()));
-  check(ISGetLocalSize(rows, &size));
-  check(ISGetIndices(rows, &numbers));
-  std::vector<PetscInt> list(numbers, numbers + size);
-  check(ISRestoreIndices(rows, &numbers));
-  return list;
+/// By levels of the graph, on each as they are numbered. Collective.
+Places from_end_to_end(DofGraph const& graph) {
+  Places level = graph.levels(most_steps);
+  PetscInt levels = level.empty() ? 0 : *std::ranges::max_element(level) + 1;
+  MPI_Allreduce(MPI_IN_PLACE, &levels, 1, MPIU_INT, MPI_MAX, graph.comm());
+  std::vector<PetscInt> count(levels), before(levels), all(levels), next(levels);
+  for (PetscInt one : level) ++count[one];
+  MPI_Exscan(count.data(), before.data(), int(levels), MPIU_INT, MPI_SUM, graph.comm());
+  if (comm_rank(graph.comm()) == 0) std::ranges::fill(before, 0);
+  MPI_Allreduce(count.data(), all.data(), int(levels), MPIU_INT, MPI_SUM, graph.comm());
+  std::exclusive_scan(all.begin(), all.end(), next.begin(), PetscInt(0));
+  std::ranges::transform(next, before, next.begin(), std::plus());
+  for (PetscInt& one : level) one = next[one]++;
+  return level;
 }
 
-/// How many dofs of a list, cut before each place of it, have a neighbour behind the cut.
-std::vector<PetscInt> across(Mat A, std::vector<PetscInt> const& list) {
-  std::vector<PetscInt> place(list.size()), last(list.size()), out(list.size() + 1);
-  for (size_t i = 0; i < list.size(); ++i) place[list[i]] = last[i] = PetscInt(i);
-  for_entries(A, [&](PetscInt row, PetscInt column, double a) {
-    if (a != 0) last[place[row]] = std::max(last[place[row]], place[column]);
-  });
-  for (size_t i = 0; i < list.size(); ++i) ++out[i], --out[last[i]];  // cuts behind i, up to the last one
-  std::partial_sum(out.begin(), out.end(), out.begin());
-  out.insert(out.begin(), 0);
-  return out;
+/// How many dofs, cut before each place, stand on one side and have a neighbour on the other: before the cut
+/// (`forwards`) or behind it. Collective.
+VecHandle across(DofGraph const& graph, Places const& places, PetscInt size, bool forwards) {
+  std::vector<PetscInt> place(places);
+  place.resize(graph.all());
+  graph.exchange(place);
+  std::vector<PetscInt> farthest(places);
+  for (PetscInt j = 0; j < graph.all(); ++j)
+    for (int i : graph.coupled_to(j))
+      farthest[i] = forwards ? std::max(farthest[i], place[j]) : std::min(farthest[i], place[j]);
+  VecHandle width;
+  check(VecCreateMPI(graph.comm(), PETSC_DECIDE, size + 1, width.out()));
+  for (PetscInt i = 0; i < graph.size(); ++i) {
+    const auto [from, to] = std::minmax(places[i], farthest[i]);
+    if (from == to) continue;
+    check(VecSetValue(width, from + 1, 1, ADD_VALUES));
+    check(VecSetValue(width, to + 1, -1, ADD_VALUES));
+  }
+  check(VecAssemblyBegin(width));
+  check(VecAssemblyEnd(width));
+  add_up(width, graph.comm());
+  return width;
 }
 
-/// A list of dofs, where it is cut, and how many dofs have neighbours behind a cut.
+/// Places of dofs, where they are cut, from which side, and how many dofs have neighbours beyond a cut.
 struct Cuts {
-  std::vector<PetscInt> list, first;
+  Places places;
+  std::vector<PetscInt> first;
+  bool forwards;
   PetscInt between;
 };
 
-/// Into as many parts as ranks, each cut at the narrowest place near to that of equal parts.
-Cuts cut(Mat A, std::vector<PetscInt> list, int parts) {
-  const auto width = across(A, list);
-  const PetscInt size = PetscInt(list.size()), away = PetscInt(near * double(size) / parts);
-  Cuts out{std::move(list), {0}, 0};
-  for (int part = 1; part < parts; ++part) {
-    const auto middle = width.begin() + PetscInt64(size) * part / parts;
-    const auto narrowest = std::min_element(middle - away, middle + away + 1);
-    out.first.push_back(PetscInt(narrowest - width.begin()));
-    out.between += *narrowest;
-  }
-  out.first.push_back(size);
+/// Into as many parts as ranks, each cut at the narrowest place near to that of equal parts. Collective.
+Cuts cut(DofGraph const& graph, Places places, PetscInt size, bool forwards) {
+  const PetscInt parts = comm_size(graph.comm()), away = PetscInt(near * double(size) / double(parts));
+  const VecHandle width = across(graph, places, size, forwards);
+  PetscInt begin, end;
+  check(VecGetOwnershipRange(width, &begin, &end));
+  const ReadArray own(width);
+  std::vector<PetscInt> narrowest(parts - 1, size), at(parts - 1, size);
+  const auto with_each = [&](auto visit) {
+    for (PetscInt part = 1; part < parts; ++part) {
+      const PetscInt middle = PetscInt(PetscInt64(size) * part / parts);
+      for (PetscInt c = std::max(begin, middle - away); c < std::min(end, middle + away + 1); ++c)
+        visit(part - 1, c, PetscInt(own[c - begin]));
+    }
+  };
+  with_each([&](PetscInt k, PetscInt, PetscInt wide) { narrowest[k] = std::min(narrowest[k], wide); });
+  MPI_Allreduce(MPI_IN_PLACE, narrowest.data(), int(parts - 1), MPIU_INT, MPI_MIN, graph.comm());
+  with_each([&](PetscInt k, PetscInt c, PetscInt wide) {
+    if (wide == narrowest[k]) at[k] = std::min(at[k], c);
+  });
+  MPI_Allreduce(MPI_IN_PLACE, at.data(), int(parts - 1), MPIU_INT, MPI_MIN, graph.comm());
+  at.insert(at.begin(), 0), at.push_back(size);
+  const PetscInt between = std::accumulate(narrowest.begin(), narrowest.end(), PetscInt(0));
+  return {std::move(places), std::move(at), forwards, between};
+}
+
+/// The last part first, and in it the last dof.
+void turn(Cuts& cuts) {
+  const PetscInt size = cuts.first.back();
+  for (PetscInt& place : cuts.places) place = size - 1 - place;
+  for (PetscInt& first : cuts.first) first = size - first;
+  std::ranges::reverse(cuts.first);
+  cuts.forwards = true;
+}
+
+/// Of the dofs as they are numbered and from end to end, both ways, what is cut across fewest. Collective.
+Cuts narrowest(DofGraph const& graph, PetscInt begin, PetscInt size) {
+  std::vector<Cuts> found;
+  for (auto const& places : {as_numbered(graph, begin), from_end_to_end(graph)})
+    for (bool forwards : {true, false}) found.push_back(cut(graph, places, size, forwards));
+  Cuts out = std::move(*std::ranges::min_element(found, {}, &Cuts::between));
+  if (!out.forwards) turn(out);
   return out;
 }
 
-/// Of the dofs as they are numbered and from end to end, both ways, what is cut across fewest.
-Cuts narrowest(Mat A, int parts) {
-  PetscInt size;
-  check(MatGetSize(A, &size, nullptr));
-  std::vector<PetscInt> numbered(size);
-  std::iota(numbered.begin(), numbered.end(), PetscInt(0));
-  std::vector<Cuts> found;
-  for (auto list : {numbered, from_end_to_end(A)}) {
-    found.push_back(cut(A, list, parts));
-    std::ranges::reverse(list);
-    found.push_back(cut(A, std::move(list), parts));
-  }
-  return std::move(*std::ranges::min_element(found, {}, &Cuts::between));
+/// The dofs of this rank's part, in order, by their numbers in the matrix. Collective.
+std::vector<PetscInt> dofs_of_part(Cuts const& cuts, PetscInt begin, MPI_Comm comm) {
+  const int rank = comm_rank(comm);
+  const VecHandle dofs = make_vector(comm, cuts.first[rank + 1] - cuts.first[rank]);
+  for (size_t i = 0; i < cuts.places.size(); ++i)
+    check(VecSetValue(dofs, cuts.places[i], double(begin + PetscInt(i)), INSERT_VALUES));
+  check(VecAssemblyBegin(dofs));
+  check(VecAssemblyEnd(dofs));
+  const ReadArray own(dofs);
+  return {own.span().begin(), own.span().end()};
 }
 
 /// One dof's coefficients, as MPI moves them.
@@ -104,21 +156,18 @@ class Coefficients {
 Partition::Partition(Mat A) {
   MPI_Comm comm;
   PetscLayout layout;
+  PetscInt size, begin;
   IsHandle part;
-  Cuts cuts;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
+  check(MatGetSize(A, &size, nullptr));
+  check(MatGetOwnershipRange(A, &begin, nullptr));
   check(MatGetLayouts(A, &layout, nullptr));
-  const MatHandle whole = on_first_rank(A, comm);
-  together(comm, "dividing the dofs", [&] {
-    if (comm_rank(comm) == 0) cuts = narrowest(whole, comm_size(comm));
-  });
-  broadcast(cuts.list, 0, comm), broadcast(cuts.first, 0, comm);
-  PetscInt const* begin = cuts.list.data() + cuts.first[comm_rank(comm)];
-  const PetscInt count = cuts.first[comm_rank(comm) + 1] - cuts.first[comm_rank(comm)];
-  check(ISCreateGeneral(comm, count, begin, PETSC_COPY_VALUES, part.out()));
+  const auto dofs = dofs_of_part(narrowest(DofGraph(A), begin, size), begin, comm);
+  const PetscInt count = PetscInt(dofs.size());
+  check(ISCreateGeneral(comm, count, dofs.data(), PETSC_COPY_VALUES, part.out()));
   check(MatCreateSubMatrix(A, part, part, MAT_INITIAL_MATRIX, matrix_.out()));
   check(PetscSFCreate(comm, given_.out()));
-  check(PetscSFSetGraphLayout(given_, layout, count, nullptr, PETSC_COPY_VALUES, begin));
+  check(PetscSFSetGraphLayout(given_, layout, count, nullptr, PETSC_COPY_VALUES, dofs.data()));
 }
 
 void Partition::take(double const* x, int coefficients, double* part) const {

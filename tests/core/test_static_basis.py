@@ -118,6 +118,50 @@ def test_ranks_without_dofs_take_part(comm, between):
     solid.assert_same(found["fwstatic"], found["direct"])
 
 
+def line(dofs):
+    """Springs of 1 N/m from one dof to the next, and of 0.5 N/m to the ground."""
+    return 2.5 * np.eye(dofs) - np.eye(dofs, k=1) - np.eye(dofs, k=-1)
+
+
+def shuffled(K):
+    order = np.random.default_rng(3).permutation(len(K))
+    return K[np.ix_(order, order)]
+
+
+GRAPHS = {
+    "a line": line(60),
+    "a line at random": shuffled(line(60)),
+    "parts that nothing joins": shuffled(np.kron(np.eye(5), line(12))),
+    "dofs on their own": np.diag(np.linspace(1.0, 2.0, 60)),
+    "one that all are coupled to": line(60) + 0.01 * (np.eye(60)[7][:, None] + np.eye(60)[7]),
+}
+
+
+@pytest.mark.ranks(2, 3)
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_any_graph_is_divided(comm, graph):
+    """Of a line few dofs lie between the ranks, however it is numbered; of dofs that nothing joins none."""
+    K = GRAPHS[graph]
+    with options(fw_static_between=0.9):
+        model = fw.Model(np.eye(60), K, 0.01 * K, [fw.Contact("jenkins", np.eye(60)[[5]], chains.SLIDER)], comm)
+        first = fw.linear_modes(model, 1, "stuck")[0]
+        dof = int(abs(first.shape).argmax())
+        found, route = {}, ""
+        for kind, given in {
+            "static": {"route": "krylov", "pc_type": "fwstatic"},
+            "direct": {"route": "direct"},
+        }.items():
+            prefix = f"{graph.replace(' ', '_')}_{kind}_"
+            with options(**{prefix + name: value for name, value in given.items()}):
+                problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", dof, first, prefix)
+                found[kind], said = solid.solve(problem, [0.1, 1.0])
+            route = route or said
+    between = int(re.search(r"and (\d+) dofs between", route)[1])
+    most = {"a line": 1, "a line at random": 1, "parts that nothing joins": 1, "dofs on their own": 0}
+    assert between <= most.get(graph, 60) * (comm.size - 1), route
+    solid.assert_same(found["static"], found["direct"])
+
+
 @pytest.mark.ranks(2, 3)
 def test_rounding_that_couples_two_substructures_one_way_alone(comm):
     """An entry of 1e-18 of the stiffness in one triangle: K is symmetric to rounding."""
