@@ -42,9 +42,11 @@ class Mumps {
     call(&id);
   }
   /// What users set of it by PETSc's names for its numbers, -<prefix>mat_mumps_icntl_<k> and cntl; not what
-  /// says where entries and right sides lie, and what is solved for.
+  /// says where entries and right sides lie, which pivots are counted as null, what is solved for and refined
+  /// (entries are given away by then).
   void take_options(std::string const& prefix) {
-    constexpr int ours[] = {5, 18, 19, 20, 21, 26, 30, 31, 32};
+    constexpr int ours[] = {1, 2, 3, 4, 5, 10, 11, 13, 18, 19, 20, 21, 24, 25, 26, 30, 31, 32};
+    constexpr int null_pivots = 3;
     PetscBool given;
     for (int k = 1; k <= 40; ++k) {
       if (std::ranges::count(ours, k) > 0) continue;
@@ -54,6 +56,7 @@ class Mumps {
       icntl(k) = int(value);
     }
     for (int k = 1; k <= 7; ++k) {
+      if (k == null_pivots) continue;
       const auto name = "-mat_mumps_cntl_" + std::to_string(k);
       check(PetscOptionsGetReal(nullptr, prefix.c_str(), name.c_str(), &id.cntl[k - 1], &given));
     }
@@ -61,7 +64,7 @@ class Mumps {
   /// Again with more workspace, where that was short.
   void run_factorise() {
     constexpr int workspace_short[] = {-8, -9, -14, -15, -17, -20};  // INFOG(1)
-    for (int attempt = 0; attempt < 5; ++attempt, icntl(14) *= 2) {
+    for (int attempt = 0; attempt < 5; ++attempt, icntl(14) = std::max(2 * icntl(14), 50)) {
       run(factorise);
       if (std::ranges::count(workspace_short, status()) == 0) return;
     }

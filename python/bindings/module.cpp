@@ -85,9 +85,12 @@ void give_memory_back() {
 
 /// petsc4py ends PETSc as Python ends, which waits on each rank for others that have objects left. Cycles of
 /// Python's hold them, an exception's frames above all, on one rank and not on another: they are collected
-/// before, for what is registered last is called first.
+/// before, for what is registered last is called first. What a script holds on one rank to its end is not:
+/// PETSc's communicator is kept, or that rank alone still had it.
 void collect_before_petsc_ends() {
   if (comm_size(PETSC_COMM_WORLD) == 1) return;
+  MPI_Comm kept;
+  check(PetscCommDuplicate(PETSC_COMM_WORLD, &kept, nullptr));
   nb::module_::import_("atexit").attr("register")(nb::module_::import_("gc").attr("collect"));
 }
 

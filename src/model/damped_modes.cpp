@@ -22,18 +22,6 @@ using PepHandle = Handle<PEP, PEPDestroy>;
 
 constexpr double tolerance = 1e-13;
 
-/// Of a law with memory: stuck, as it is at rest.
-std::vector<double> stuck_tangent(contact::Law const& law) {
-  const int d = law.components(), n = law.pairs();
-  std::vector<double> out(size_t(d) * n);
-  for (int i = 0; i < n; ++i)
-    for (int c = 0; c < d; ++c) out[size_t(i) * d + c] = law.stuck_stiffness(c, i);
-  if (std::ranges::any_of(out, [](double k) { return std::isinf(k); }))
-    throw InputError("contact that sticks rigidly has no tangent at rest", "", "a finite stiffness",
-                     "ask for the modes of stuck contact, or give the law a stiffness");
-  return out;
-}
-
 /// The law's tangents at rest, per contact row (diagonal part).
 struct RestTangent {
   std::vector<double> stiffness, damping;
@@ -47,7 +35,7 @@ RestTangent rest_tangent(contact::Law const& law, MPI_Comm comm) {
   together(comm, "contact at rest", [&] {
     fault::point("contact at rest");
     if (law.hereditary())  // its tangents are of a period
-      out.stiffness = stuck_tangent(law);
+      for (int k = 0; k < d * n; ++k) out.stiffness[k] = law.stuck_stiffness(k % d, k / d);
     else
       law.force({.samples = 1, .components = d, .pairs = n, .u = zero.data(), .v = zero.data(), .step = 1},
                 f.data(), record);

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "together.h"
+
 namespace fretwave::model {
 
 DofGraph::DofGraph(Mat A) {
@@ -9,9 +11,21 @@ DofGraph::DofGraph(Mat A) {
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm_));
   check(MatGetOwnershipRange(A, &begin_, &end_));
   check(MatGetLayouts(A, &layout, nullptr));
+  together(comm_, "reading which dofs are coupled", [&] { read(A); });
+  check(PetscSFCreate(comm_, owners_.out()));
+  check(PetscSFSetGraphLayout(owners_, layout, PetscInt(others_.size()), nullptr, PETSC_COPY_VALUES,
+                              others_.data()));
+}
+
+void DofGraph::read(Mat A) {
   const auto is_own = [&](PetscInt dof) { return dof >= begin_ && dof < end_; };
-  for_entries(A, [&](PetscInt, PetscInt column, double a) {
-    if (a != 0 && !is_own(column)) others_.push_back(column);
+  const auto with_each = [&](auto visit) {
+    for_entries(A, [&](PetscInt row, PetscInt column, double a) {
+      if (a != 0 && row != column) visit(row, column);
+    });
+  };
+  with_each([&](PetscInt, PetscInt column) {
+    if (!is_own(column)) others_.push_back(column);
   });
   std::ranges::sort(others_);
   others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
@@ -19,20 +33,15 @@ DofGraph::DofGraph(Mat A) {
     return is_own(dof) ? dof - begin_ : size() + (std::ranges::lower_bound(others_, dof) - others_.begin());
   };
   first_.assign(all() + 1, 0);
-  for_entries(A, [&](PetscInt, PetscInt column, double a) { first_[place(column) + 1] += a != 0; });
+  with_each([&](PetscInt, PetscInt column) { ++first_[place(column) + 1]; });
   std::partial_sum(first_.begin(), first_.end(), first_.begin());
-  rows_.resize(first_.back());
-  std::vector<int> next(first_.begin(), first_.end() - 1);
-  for_entries(A, [&](PetscInt row, PetscInt column, double a) {
-    if (a != 0) rows_[next[place(column)]++] = int(row - begin_);
-  });
-  check(PetscSFCreate(comm_, owners_.out()));
-  check(PetscSFSetGraphLayout(owners_, layout, PetscInt(others_.size()), nullptr, PETSC_COPY_VALUES,
-                              others_.data()));
+  rows_.resize(size_t(first_.back()));
+  std::vector<PetscInt64> next(first_.begin(), first_.end() - 1);
+  with_each([&](PetscInt row, PetscInt column) { rows_[next[place(column)]++] = int(row - begin_); });
 }
 
 std::span<int const> DofGraph::coupled_to(PetscInt j) const {
-  return std::span(rows_).subspan(first_[j], first_[j + 1] - first_[j]);
+  return std::span(rows_).subspan(size_t(first_[j]), size_t(first_[j + 1] - first_[j]));
 }
 
 void DofGraph::exchange(std::span<PetscInt> values) const {
@@ -86,23 +95,38 @@ struct DofGraph::Walk {
   }
 };
 
-/// Of all ranks' dofs, by its number in the matrix. Collective.
-PetscInt DofGraph::first_without(std::span<PetscInt const> level) const {
-  const auto own = level.first(size());
-  const auto found = std::ranges::find(own, unreached);
-  return smallest(found == own.end() ? none : begin_ + (found - own.begin()), comm_);
+/// The first dof of all ranks that is not reached, by its number in the matrix; `from`: no own one before it
+/// is. Collective.
+PetscInt DofGraph::first_unreached(std::span<PetscInt const> level, PetscInt& from) const {
+  while (from < size() && level[from] != unreached) ++from;
+  return smallest(from == size() ? none : begin_ + from, comm_);
+}
+
+/// Dofs that nothing is coupled to are all on the first level: each by itself would take a walk.
+void DofGraph::reach_alone(std::span<PetscInt> level) const {
+  std::vector<char> coupled(size(), 0);
+  for (PetscInt j = 0; j < all(); ++j) {
+    const auto rows = coupled_to(j);
+    if (j < size() && !rows.empty()) coupled[j] = 1;
+    for (int i : rows) coupled[i] = 1;
+  }
+  for (PetscInt i = 0; i < size(); ++i)
+    if (!coupled[i]) level[i] = 0;
 }
 
 std::vector<PetscInt> DofGraph::levels(int steps) const {
   std::vector<PetscInt> level(all(), unreached);
-  PetscInt next = 0;
-  for (PetscInt start = first_without(level); start != none && steps > 0; start = first_without(level)) {
-    for (int sought = 0; sought < 2; ++sought) {  // the dof farthest from any is near an end
-      Walk walk(*this, level, start, next, steps);
-      start = walk.farthest;
+  reach_alone(level);
+  PetscInt next = 1, from = 0;
+  for (PetscInt start = first_unreached(level, from); start != none && steps > 0;
+       start = first_unreached(level, from)) {
+    Walk walk(*this, level, start, next, steps);
+    if (steps > 0) {  // the dof farthest from any is near an end
       walk.undo();
+      next = Walk(*this, level, walk.farthest, next, steps).last + 1;
+    } else {
+      next = walk.last + 1;
     }
-    next = Walk(*this, level, start, next, steps).last + 1;
   }
   std::ranges::replace(level, unreached, next);
   level.resize(size());

@@ -22,17 +22,21 @@ class DofGraph {
   /// Of all dofs, where those of own ones are known. Collective.
   void exchange(std::span<PetscInt> values) const;
   /// Distance of each own dof from an end of the graph (Cuthill & McKee 1969), one connected part behind the
-  /// other; what is not reached in so many steps is as far as the last. Collective.
+  /// other; what is not reached in so many steps is as far as the last. (Within a level they stand as
+  /// numbered: of a blade cut into 16 parts a tenth more lie between than by Cuthill-McKee.) Collective.
   std::vector<PetscInt> levels(int steps) const;
 
  private:
   struct Walk;
-  PetscInt first_without(std::span<PetscInt const> level) const;
+  void read(Mat);
+  void reach_alone(std::span<PetscInt> level) const;
+  PetscInt first_unreached(std::span<PetscInt const> level, PetscInt& from) const;
 
   MPI_Comm comm_;
   PetscInt begin_, end_;
   std::vector<PetscInt> others_;  ///< ascending
-  std::vector<int> first_, rows_;
+  std::vector<PetscInt64> first_;
+  std::vector<int> rows_;
   Handle<PetscSF, PetscSFDestroy> owners_;  ///< leaves: `others_`
 };
 

@@ -71,39 +71,12 @@ VecHandle across(DofGraph const& graph, Places const& places, PetscInt size, boo
   return width;
 }
 
-/// Places of dofs, where they are cut, from which side, and how many dofs have neighbours beyond a cut.
+/// Places of dofs, where they are cut, and how many have neighbours beyond a cut.
 struct Cuts {
   Places places;
   std::vector<PetscInt> first;
-  bool forwards;
   PetscInt between;
 };
-
-/// Into as many parts as ranks, each cut at the narrowest place near to that of equal parts. Collective.
-Cuts cut(DofGraph const& graph, Places places, PetscInt size, bool forwards) {
-  const PetscInt parts = comm_size(graph.comm()), away = PetscInt(near * double(size) / double(parts));
-  const VecHandle width = across(graph, places, size, forwards);
-  PetscInt begin, end;
-  check(VecGetOwnershipRange(width, &begin, &end));
-  const ReadArray own(width);
-  std::vector<PetscInt> narrowest(parts - 1, size), at(parts - 1, size);
-  const auto with_each = [&](auto visit) {
-    for (PetscInt part = 1; part < parts; ++part) {
-      const PetscInt middle = PetscInt(PetscInt64(size) * part / parts);
-      for (PetscInt c = std::max(begin, middle - away); c < std::min(end, middle + away + 1); ++c)
-        visit(part - 1, c, PetscInt(own[c - begin]));
-    }
-  };
-  with_each([&](PetscInt k, PetscInt, PetscInt wide) { narrowest[k] = std::min(narrowest[k], wide); });
-  MPI_Allreduce(MPI_IN_PLACE, narrowest.data(), int(parts - 1), MPIU_INT, MPI_MIN, graph.comm());
-  with_each([&](PetscInt k, PetscInt c, PetscInt wide) {
-    if (wide == narrowest[k]) at[k] = std::min(at[k], c);
-  });
-  MPI_Allreduce(MPI_IN_PLACE, at.data(), int(parts - 1), MPIU_INT, MPI_MIN, graph.comm());
-  at.insert(at.begin(), 0), at.push_back(size);
-  const PetscInt between = std::accumulate(narrowest.begin(), narrowest.end(), PetscInt(0));
-  return {std::move(places), std::move(at), forwards, between};
-}
 
 /// The last part first, and in it the last dof.
 void turn(Cuts& cuts) {
@@ -111,7 +84,36 @@ void turn(Cuts& cuts) {
   for (PetscInt& place : cuts.places) place = size - 1 - place;
   for (PetscInt& first : cuts.first) first = size - first;
   std::ranges::reverse(cuts.first);
-  cuts.forwards = true;
+}
+
+/// Into as many parts as ranks, each cut at the narrowest place near to that of equal parts, and of those at
+/// the nearest. Collective.
+Cuts cut(DofGraph const& graph, Places places, PetscInt size, bool forwards) {
+  const PetscInt parts = comm_size(graph.comm()), away = PetscInt(near * double(size) / double(parts));
+  const VecHandle width = across(graph, places, size, forwards);
+  PetscInt begin, end;
+  check(VecGetOwnershipRange(width, &begin, &end));
+  const ReadArray own(width);
+  std::vector<PetscInt> narrowest(parts - 1, size),
+      off(parts - 1, 2 * away + 1);  // twice the distance, 1 behind
+  const auto middle = [&](PetscInt k) { return PetscInt(PetscInt64(size) * (k + 1) / parts); };
+  const auto with_each = [&](auto visit) {
+    for (PetscInt k = 0; k < parts - 1; ++k)
+      for (PetscInt c = std::max(begin, middle(k) - away); c < std::min(end, middle(k) + away + 1); ++c)
+        visit(k, c, PetscInt(own[c - begin]));
+  };
+  with_each([&](PetscInt k, PetscInt, PetscInt wide) { narrowest[k] = std::min(narrowest[k], wide); });
+  MPI_Allreduce(MPI_IN_PLACE, narrowest.data(), int(parts - 1), MPIU_INT, MPI_MIN, graph.comm());
+  with_each([&](PetscInt k, PetscInt c, PetscInt wide) {
+    if (wide == narrowest[k]) off[k] = std::min(off[k], 2 * std::abs(c - middle(k)) + (c > middle(k)));
+  });
+  MPI_Allreduce(MPI_IN_PLACE, off.data(), int(parts - 1), MPIU_INT, MPI_MIN, graph.comm());
+  Cuts out{std::move(places), {0}, std::accumulate(narrowest.begin(), narrowest.end(), PetscInt(0))};
+  for (PetscInt k = 0; k < parts - 1; ++k)
+    out.first.push_back(middle(k) + (off[k] % 2 ? off[k] / 2 : -(off[k] / 2)));
+  out.first.push_back(size);
+  if (!forwards) turn(out);
+  return out;
 }
 
 /// Of the dofs as they are numbered and from end to end, both ways, what is cut across fewest. Collective.
@@ -119,9 +121,7 @@ Cuts narrowest(DofGraph const& graph, PetscInt begin, PetscInt size) {
   std::vector<Cuts> found;
   for (auto const& places : {as_numbered(graph, begin), from_end_to_end(graph)})
     for (bool forwards : {true, false}) found.push_back(cut(graph, places, size, forwards));
-  Cuts out = std::move(*std::ranges::min_element(found, {}, &Cuts::between));
-  if (!out.forwards) turn(out);
-  return out;
+  return std::move(*std::ranges::min_element(found, {}, &Cuts::between));
 }
 
 /// The dofs of this rank's part, in order, by their numbers in the matrix. Collective.

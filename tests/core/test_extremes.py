@@ -272,13 +272,15 @@ def test_what_an_exception_holds_on_one_rank_leaves_no_other_waiting(chain_case,
     assert launch(2, "-c", UNCOLLECTED, *words, timeout=40.0).returncode == 3
 
 
-#: A script that catches an error, which a cycle holds on the first rank alone.
+#: A script that catches an error, which the first rank alone holds: by a cycle, or to its end.
 CAUGHT = """
 import gc
 gc.set_threshold(10**6)
 import numpy as np
 from mpi4py import MPI
 import fretwave as fw
+
+kept = []
 
 def load_what_is_free():
     free = np.diag([1.0, 2.0, 1.0]) - np.eye(3, k=1) - np.eye(3, k=-1)
@@ -289,7 +291,7 @@ def load_what_is_free():
         fw.static_preload(model, np.ones(3))
     except fw.NotConverged as error:
         if MPI.COMM_WORLD.rank == 0:
-            held = [error]  # whose frames hold it
+            HELD
         print("caught", flush=True)
 
 load_what_is_free()
@@ -297,8 +299,9 @@ load_what_is_free()
 
 
 @pytest.mark.ranks(1)
-def test_what_a_script_has_caught_on_one_rank_leaves_no_other_waiting(launch):
-    done = launch(2, "-c", CAUGHT, timeout=40.0)
+@pytest.mark.parametrize("held", ["held = [error]", "kept.append(error)"], ids=["by a cycle", "to the end"])
+def test_what_a_script_has_caught_on_one_rank_leaves_no_other_waiting(launch, held):
+    done = launch(2, "-c", CAUGHT.replace("HELD", held), timeout=40.0)
     assert done.returncode == 0 and done.stdout.split() == ["caught", "caught"], done.stderr
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import test_sparse_route as solid
 import test_stuck_basis as chains
 from models.core_models import options
@@ -160,6 +161,25 @@ def test_any_graph_is_divided(comm, graph):
     most = {"a line": 1, "a line at random": 1, "parts that nothing joins": 1, "dofs on their own": 0}
     assert between <= most.get(graph, 60) * (comm.size - 1), route
     solid.assert_same(found["static"], found["direct"])
+
+
+@pytest.mark.ranks(2)
+@pytest.mark.parametrize("beside", ["a long line", "4000 dofs on their own"])
+def test_long_graphs_and_many_parts_are_divided(comm, beside):
+    """More levels than are counted, and more parts than are sought one by one: still few dofs lie between."""
+    long = beside == "a long line"
+    n, count = (7000, 7000) if long else (4500, 500)
+    place = np.random.default_rng(3).permutation(n) if long else np.arange(n)
+    main = 2.5 + 0.05 * np.arange(n)[::-1]  # the last dofs move, in modes far apart
+    off = np.where(np.arange(n - 1) < n - count, 0.0, -1.0)
+    K = sp.diags([off, main, off], [-1, 0, 1], format="csr")[place][:, place]
+    B = sp.csr_matrix(([1.0], ([0], [n - 1])), shape=(1, n))[:, place]
+    with options(fw_static_between=0.1):
+        model = fw.Model(sp.identity(n, format="csr"), K, 0.01 * K, [fw.Contact("jenkins", B, chains.SLIDER)], comm)
+        first = fw.linear_modes(model, 1, "stuck")[0]
+        problem = solid.mode(model, int(abs(first.shape).argmax()), "divided_", route="krylov", pc_type="fwstatic")
+        _, route = solid.solve(problem, [0.1])
+    assert int(re.search(r"and (\d+) dofs between", route)[1]) <= 2, route
 
 
 @pytest.mark.ranks(2, 3)

@@ -160,8 +160,14 @@ def test_a_study_or_a_sweep_does_not_hide_a_run(folder, capsys):
     assert "0.02" in capsys.readouterr().out
 
 
-def test_a_run_does_not_take_a_sweeps_folder(tmp_path, capsys):
+def test_a_run_takes_a_sweeps_folder_by_force_alone(tmp_path, capsys):
+    """And then the whole of it: results of the sweep stood beside those of the run."""
     assert call("sweep", CASE, *SHORT, "--over", "mode.harmonics=3,5", "--out", tmp_path) == 0
-    assert call("run", CASE, *SHORT, "--out", tmp_path) == 2
+    epmc = ["run", CASE, "--quick", "--no-plots", "-q", "--only", "mode_epmc", "--out", tmp_path]
+    assert call(*epmc) == 2
     assert "a sweep" in capsys.readouterr().err
-    assert call("run", CASE, *SHORT, "--out", tmp_path, "--force") == 0
+    assert call(*epmc, "--force") == 0
+    with h5py.File(tmp_path / "results.h5", "r") as file:
+        assert set(file) == {"mode_epmc"}
+    assert not (tmp_path / "values").exists() and call("show", tmp_path) == 0
+    assert "sweep" not in capsys.readouterr().out

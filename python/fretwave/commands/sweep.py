@@ -78,7 +78,7 @@ def resume_sweep(
             where=display(path),
             measured="; ".join(changed[:5]) or "values after the first",
             expected=f"the case as kept in {display(folder / CASE_COPY)}",
-            fix=f"change it back, or start anew with `fretwave sweep {display(path)}`",
+            fix=f"change it back, or start anew with `fretwave sweep {display(path)} --out {display(folder)}`",
         )
     record["ranks"], record["status"] = comm.size, "running"
     return _run_sweep(sweep, checked[0], RunFolder(folder, record, checked[0].text, comm.rank == 0, True), comm)

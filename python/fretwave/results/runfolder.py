@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 import resource
+import shutil
 import socket
 import sys
 import time
@@ -95,12 +96,14 @@ class RunFolder:
         if self._force:
             return
         fix = "choose another folder with --out, or replace the results with --force"
-        other, earlier = self._other_case(), self._earlier()
-        if other is not None:
-            measured, expected = (display(Path(case["path"])) for case in (other, self.record["case"]))
+        earlier = self._earlier()
+        if earlier is None:
+            return
+        if self._of_another_case(earlier):
+            measured, expected = (display(Path(record["case"]["path"])) for record in (earlier, self.record))
             what = "this folder holds the results of another case"
             raise InputError(what, display(self.path), measured, expected, fix)
-        if earlier is not None and _kind(earlier) != _kind(self.record):
+        if _kind(earlier) != _kind(self.record):
             what = "this folder holds results of another kind, which would not be shown any more"
             raise InputError(what, display(self.path), _kind(earlier), _kind(self.record), fix)
 
@@ -113,11 +116,10 @@ class RunFolder:
         except InputError:
             return None
 
-    def _other_case(self) -> dict[str, Any] | None:
-        """How the case was given whose results are here, if it is another file with another content."""
-        own, record = self.record["case"], self._earlier()
-        earlier: dict[str, Any] = record["case"] if record is not None else own
-        return None if earlier["path"] == own["path"] or earlier.get("digest") == own["digest"] else earlier
+    def _of_another_case(self, earlier: Mapping[str, Any]) -> bool:
+        """A case in another file with another content."""
+        own, other = self.record["case"], earlier["case"]
+        return bool(other["path"] != own["path"] and other.get("digest") != own["digest"])
 
     def start(self) -> None:
         """Lock the folder, write the record and open the log; called when the first point is there.
@@ -136,10 +138,11 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         self._lock.take()
         self.started = True
-        if self._other_case() is None:
+        earlier = self._earlier()
+        if earlier is None or not (self._of_another_case(earlier) or _kind(earlier) != _kind(self.record)):
             self._keep_earlier()
         else:
-            self._forget_earlier()
+            self._forget(earlier)
         replace_text(self.path / CASE_COPY, self._case_text)
         self.record["case"]["text_checksum"] = text_checksum(self._case_text.encode("utf-8"))
         self.save()
@@ -157,9 +160,11 @@ class RunFolder:
         kept = {name: entry for name, entry in earlier.items() if self._resumed or name not in self.record["selected"]}
         self.record["analyses"] = {**kept, **self.record["analyses"]}
 
-    def _forget_earlier(self) -> None:
-        """Remove results of another case; its tables and pictures stay until others take their names."""
+    def _forget(self, earlier: Mapping[str, Any]) -> None:
+        """Remove results of another case or kind; its tables and pictures stay until others take their names."""
         (self.path / "results.h5").unlink(missing_ok=True)
+        if "sweep" in earlier:
+            shutil.rmtree(self.path / "values", ignore_errors=True)
         for name in unfinished(self.path):
             Journal(self.path, name).remove()
 
