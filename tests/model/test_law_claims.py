@@ -78,6 +78,13 @@ class Slider(Cubic):
         return f
 
 
+class Forgetful(Cubic):
+    """Without `return`: where a force is one number, None was one that is not a number."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        super().force(u, v)
+
+
 class Steeper(Cubic):
     """A tangent by 1 %: peaks of responses were off by far more than the errors told of them."""
 
@@ -114,6 +121,7 @@ WRONG = {
     Words: "returned a force that is no number",
     Counting: "depends on more than the present",
     Slider: "depends on more than the present",
+    Forgetful: "returned a force that is no number",
     Steeper: "the tangents of a law in Python are not those of its force",
     Undamped: "the tangents of a law in Python are not those of its force",
     Hidden: "`gap` of a law in Python is wrong",

@@ -73,11 +73,12 @@ def taken(
     if type(values) is np.ndarray and values.dtype == np.float64 and values.shape == shape:  # in time, at each step
         return np.ascontiguousarray(values)
     found, where = np.asanyarray(values), place_of(law)
-    if found.dtype.kind == "O":
+    if found.dtype.kind == "O" and values is not None:  # which would be one that is not a number
         with suppress(TypeError, ValueError):
             found = found.astype(float)
     if found.dtype.kind not in "biufc" or masked(found):
-        kind, fix = "masked values" if masked(found) else found.dtype.name, "return an array of numbers"
+        kind = "None" if values is None else "masked values" if masked(found) else found.dtype.name
+        fix = "return an array of numbers"
         raise InputError(f"a law in Python returned {what} that is no number", where, kind, "real numbers", fix)
     flat = found.shape == (math.prod(shape),)
     if not flat and np.squeeze(np.empty(found.shape, "b")).shape != np.squeeze(np.empty(shape, "b")).shape:
