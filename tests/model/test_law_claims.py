@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fretwave as fw
-from fretwave.model.law_claims import check_tangents
+from fretwave.model.law_claims import check_motion, check_tangents
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -78,6 +78,26 @@ class Slider(Cubic):
         return f
 
 
+class SliderAsItBegins(Cubic):
+    """The same through one period: the first sample, the farthest, has the same force by itself."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        f, at = np.empty_like(u), np.zeros_like(u[0])
+        for k in range(len(u)):
+            f[k] = np.clip(0.5 * (u[k] - at), -0.02, 0.02)
+            at = u[k] - f[k] / 0.5
+        return f
+
+
+class Masing(Cubic):
+    """A slider in closed form, whose loop is that of the largest displacement."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        end = np.abs(u).max(axis=0)
+        loop = 0.5 * (u + np.where(v > 0, end, -end)) - np.where(v > 0, 0.02, -0.02)
+        return np.where(end < 0.04, 0.5 * u, np.clip(loop, -0.02, 0.02))
+
+
 class Forgetful(Cubic):
     """Without `return`: where a force is one number, None was one that is not a number."""
 
@@ -136,6 +156,15 @@ def test_a_law_that_is_not_what_it_says_is_refused(law: type[Cubic]) -> None:
         followed(law())
     # ranks tell each other all of it
     assert error.value.where == f"law '{law.__name__}'" and str(error.value).endswith(error.value.fix)
+
+
+@pytest.mark.parametrize("law", [SliderAsItBegins, Masing], ids=lambda law: law.__name__)
+def test_a_memory_that_the_farthest_sample_does_not_show_is_refused(law: type[Cubic]) -> None:
+    """Masing's loop was followed to zeta = 0.84 %, and a slider through one period until it was killed."""
+    t = 1e-3 + np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+    u, v = (np.tile(part[:, None, None], (1, 2, 5)) for part in (np.cos(t), -np.sin(t)))
+    with pytest.raises(fw.InputError, match="depends on more than the present"):
+        check_motion(law(), u, v, law().force(u, v))
 
 
 #: With another traceback in them.

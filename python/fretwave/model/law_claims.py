@@ -107,7 +107,9 @@ def check_status(law: PythonLaw, status: Array) -> None:
 
 
 def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
-    """One sample of it gives the same force by itself, and of an odd law its mirror the opposite one.
+    """Two samples of it give the same forces by themselves, and of an odd law their mirrors the opposite ones.
+
+    Where it is farthest a slider stands as if it had just been pushed there, and as it begins: not where it is fastest.
 
     Raises
     ------
@@ -117,14 +119,15 @@ def check_motion(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
     moving = ((u != 0) & (v != 0)).all(axis=1)
     if not moving.any():
         return
-    sample = int(np.argmax(np.where(moving, np.abs(u).min(axis=1), 0.0).max(axis=1)))
-    at, pairs = slice(sample, sample + 1), moving[sample]
-    if not _same(_alone(law, u[at], v[at]), f[at], f):
-        what = "the force of a law in Python depends on more than the present displacement and velocity"
-        raise InputError(what, place_of(law), "a sample by itself has another force", "the same force", MEMORY)
-    if law.odd and not _same(-_alone(law, -u[at], -v[at])[..., pairs], f[at][..., pairs], f):
-        what, fix = "a law in Python says `odd = True`, and is not", "leave `odd` out, or say False"
-        raise InputError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
+    for part in (u, v):
+        sample = int(np.argmax(np.where(moving, np.abs(part).min(axis=1), 0.0).max(axis=1)))
+        at, pairs = slice(sample, sample + 1), moving[sample]
+        if not _same(_alone(law, u[at], v[at]), f[at], f):
+            what = "the force of a law in Python depends on more than the present displacement and velocity"
+            raise InputError(what, place_of(law), "a sample by itself has another force", "the same force", MEMORY)
+        if law.odd and not _same(-_alone(law, -u[at], -v[at])[..., pairs], f[at][..., pairs], f):
+            what, fix = "a law in Python says `odd = True`, and is not", "leave `odd` out, or say False"
+            raise InputError(what, place_of(law), "f(-u, -v) is not -f(u, v)", "an odd force", fix)
 
 
 def check_tangents(law: PythonLaw, u: Array, v: Array, f: Array) -> None:
