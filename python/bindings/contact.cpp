@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "casters.h"
 #include "contact/registry.h"
 
@@ -20,7 +22,9 @@ class PythonLaw : public contact::Law {
   int pairs() const override { return pairs_; }
   bool odd() const override { return odd_; }
   int normal() const override { return normal_; }
-  double stuck_stiffness(int, int) const override { return stuck_stiffness_; }
+  double stuck_stiffness(int, int pair) const override {
+    return open_.empty() || !open_[pair] ? stuck_stiffness_ : 0;
+  }
   nb::object given() const { return law_; }
 
   void force(contact::Motion const& motion, double* f, contact::Record& record) const override {
@@ -46,6 +50,21 @@ class PythonLaw : public contact::Law {
     if (!out.gap.empty()) out.gap = gap;
   }
 
+ protected:
+  /// Which pairs are open there, as the law itself says.
+  void set_rest(double const* u) override {
+    if (normal_ < 0) return;  // nothing opens
+    const std::vector<double> still(size_t(components_) * pairs_);
+    std::vector<double> f(still.size());
+    const contact::Motion motion{
+        .samples = 1, .components = components_, .pairs = pairs_, .u = u, .v = still.data(), .step = 1};
+    contact::Record record;
+    force_alone(motion, f.data(), record);
+    const auto status = contact::states(*this, motion, f.data()).status;
+    open_.resize(status.size());
+    std::ranges::transform(status, open_.begin(), [](auto one) { return one == contact::Status::open; });
+  }
+
  private:
   static std::vector<size_t> shape_of(contact::Motion const& motion) {
     return {size_t(motion.samples), size_t(motion.components), size_t(motion.pairs)};
@@ -65,6 +84,7 @@ class PythonLaw : public contact::Law {
   int pairs_, components_, normal_;
   bool odd_;
   double stuck_stiffness_;
+  std::vector<char> open_;  ///< at rest; empty where none can be
 };
 
 char const* name_of(contact::Role role) {

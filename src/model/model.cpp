@@ -42,6 +42,15 @@ void check_map(Contact const& contact, Mat B, PetscInt local, PetscInt global) {
 
 }  // namespace
 
+namespace {
+
+/// A law that has not been told of another state stands at rest where nothing has moved.
+void stand_at_rest(contact::Law& law) {
+  if (law.version() == 0) law.rest(std::vector<double>(size_t(law.components()) * law.pairs()).data());
+}
+
+}  // namespace
+
 Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta, PetscInt unit)
     : terms_(std::move(terms)), contacts_(std::move(contacts)), unit_(unit), theta_(theta) {
   if (terms_.empty())
@@ -58,6 +67,9 @@ Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double thet
       check_map(contact, contact.B, local_, global_);
       for (auto const& map : contact.ahead) check_map(contact, map.B, local_, global_);
     }
+  });
+  together(comm_, "contact at rest", [this] {
+    for (auto const& contact : contacts_) stand_at_rest(*contact.law);
   });
 }
 

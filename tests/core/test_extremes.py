@@ -302,7 +302,7 @@ load_what_is_free()
 @pytest.mark.parametrize("held", ["held = [error]", "kept.append(error)"], ids=["by a cycle", "to the end"])
 def test_what_a_script_has_caught_on_one_rank_leaves_no_other_waiting(launch, held):
     done = launch(2, "-c", CAUGHT.replace("HELD", held), timeout=40.0)
-    assert done.returncode == 0 and done.stdout.split() == ["caught", "caught"], done.stderr
+    assert done.returncode == 0 and done.stdout.count("caught") == 2, done.stderr
 
 
 @pytest.mark.ranks(1)

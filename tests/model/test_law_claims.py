@@ -184,7 +184,7 @@ def test_other_ranks_are_told_what_a_law_raises_and_where() -> None:
     with pytest.raises(fw.FretwaveError) as error:
         followed(Raising())
     assert error.value.what == f"ValueError: {WORDS}"
-    assert error.value.where is not None and f'rank 0, contact forces, File "{__file__}", line' in error.value.where
+    assert error.value.where is not None and f'rank 0, contact at rest, File "{__file__}", line' in error.value.where
 
 
 class Interrupting(Cubic):
