@@ -60,9 +60,10 @@ class PythonLaw : public contact::Law {
         .samples = 1, .components = components_, .pairs = pairs_, .u = u, .v = still.data(), .step = 1};
     contact::Record record;
     force_alone(motion, f.data(), record);
-    const auto status = contact::states(*this, motion, f.data()).status;
-    open_.resize(status.size());
-    std::ranges::transform(status, open_.begin(), [](auto one) { return one == contact::Status::open; });
+    const auto found = contact::states(*this, motion, f.data());
+    open_.resize(found.status.size());
+    for (size_t i = 0; i < open_.size(); ++i)  // not where it just touches
+      open_[i] = found.status[i] == contact::Status::open && found.gap[i] > 0;
   }
 
  private:

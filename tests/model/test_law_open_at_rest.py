@@ -26,6 +26,9 @@ class Stop(fw.PythonLaw):
     def status(self, u: Any, v: Any, f: Any) -> Any:
         return np.where(f[:, 0] > 0, 0, 2)
 
+    def gap(self, u: Any, v: Any, f: Any) -> Any:
+        return np.maximum(self.given - u[:, 0], 0.0)
+
 
 @pytest.mark.parametrize("gap", [0.5, -0.5])
 def test_pairs_that_are_open_at_rest_do_not_stick(gap: float) -> None:

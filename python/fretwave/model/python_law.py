@@ -47,7 +47,8 @@ class PythonLaw:
     odd : bool
         f(-u, -v) = -f(u, v): even harmonics may be left out.
     stuck_stiffness : float
-        Stiffness of the closed contact [force/length] in stuck linear modes; infinite means no relative motion.
+        Stiffness of the closed contact [force/length] in stuck linear modes; infinite means no relative motion. Pairs
+        that are `status` open at rest, by a `gap` above 0, have none.
     pairs : array of int
         Which pairs (rows of B) the arrays hold, on this rank; set by the model.
     """
