@@ -40,10 +40,6 @@ void check_map(Contact const& contact, Mat B, PetscInt local, PetscInt global) {
                      "give B one row per pair and component, one column per dof");
 }
 
-}  // namespace
-
-namespace {
-
 /// A law that has not been told of another state stands at rest where nothing has moved.
 void stand_at_rest(contact::Law& law) {
   if (law.version() == 0) law.rest(std::vector<double>(size_t(law.components()) * law.pairs()).data());

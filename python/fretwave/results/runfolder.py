@@ -93,12 +93,10 @@ class RunFolder:
     def check_free(self) -> None:
         """Refuse a folder that another run has, results of another case, or of another kind. One rank only."""
         check_free(self.path)
-        if self._force:
-            return
-        fix = "choose another folder with --out, or replace the results with --force"
-        earlier = self._earlier()
+        earlier = None if self._force else self._earlier()
         if earlier is None:
             return
+        fix = "choose another folder with --out, or replace the results with --force"
         if self._of_another_case(earlier):
             measured, expected = (display(Path(record["case"]["path"])) for record in (earlier, self.record))
             what = "this folder holds the results of another case"
